@@ -1,0 +1,1 @@
+//! Monitors that decide whether a channel is to be believed. Plain numbers in, verdicts out.
