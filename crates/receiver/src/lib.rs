@@ -1,1 +1,7 @@
-//! GPS software receiver.
+//! GPS software receiver: samples in, positions and verdicts out.
+
+mod error;
+pub mod record;
+pub mod sink;
+
+pub use error::ReceiverError;
