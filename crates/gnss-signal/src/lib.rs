@@ -1,13 +1,18 @@
 //! GNSS signal processing: samples to correlator sums to discriminators; acquisition and scalar
 //! tracking. Knows no position.
 
+mod acquisition;
 mod bank;
+mod ca_code;
 mod error;
+pub mod sample;
 mod signal;
 
+pub use acquisition::AcquisitionEngine;
 pub use bank::{
     AcquisitionHit, CorrelatorBank, MAX_TAPS, Replica, SearchReport, SearchRequest, TapOffsets,
     Taps,
 };
+pub use ca_code::{CA_CODE_LENGTH_CHIPS, ranging_code};
 pub use error::SignalError;
 pub use signal::{FrontEnd, Signal, SignalId, SignalSpec};
