@@ -3,5 +3,6 @@
 mod error;
 pub mod record;
 pub mod sink;
+pub mod summary;
 
 pub use error::ReceiverError;

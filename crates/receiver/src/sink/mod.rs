@@ -1,7 +1,19 @@
 //! Writers of output files, one for each format.
 
+mod calendar;
+pub mod channels;
+pub mod events;
+pub mod file;
+pub mod pvt;
+#[cfg(test)]
+pub(crate) mod sample_records;
+pub mod taps;
+mod text;
+
 use crate::ReceiverError;
 use crate::record::Record;
+
+pub(crate) use text::rounded;
 
 /// Writes records to one place.
 pub trait EventSink {
