@@ -1,0 +1,401 @@
+//! One channel: from an acquisition to bits and epochs, interval by interval.
+
+use super::discriminator::EarlyPromptLate;
+use super::epoch::ChannelEpoch;
+use super::nco::Nco;
+use super::pull_in::{PullInEstimate, Stretch};
+use super::steady::Steady;
+use super::{Lock, NoiseFloor, TrackingSettings, cn0};
+use crate::{AcquisitionHit, FrontEnd, Replica, SignalId, TapOffsets, Taps};
+
+/// A data bit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NavBit {
+    /// Its sum: the sign is the bit (polarity unresolved), the magnitude the confidence.
+    pub soft: f32,
+    /// The code period in which it begins, counted since the channel's first.
+    pub code_period: u64,
+}
+
+/// What one integration brought.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ChannelUpdate {
+    /// A complete data bit.
+    pub bit: Option<NavBit>,
+    /// The bit boundaries were found: tracking restarts at the beginning of the stretch.
+    pub bit_sync: bool,
+}
+
+/// Follows one signal with its own loops.
+///
+/// A channel asks for correlations by [`Channel::replica`] and takes their sums by
+/// [`Channel::update`]. It may ask for samples up to two seconds old: once the bit boundaries are
+/// found in the pull-in, it goes back to its first sample.
+#[derive(Debug, Clone)]
+pub struct Channel {
+    settings: TrackingSettings,
+    stage: Stage,
+}
+
+#[derive(Debug, Clone)]
+enum Stage {
+    PullIn(PullIn),
+    Steady(Box<Steady>),
+    Lost(SignalId),
+}
+
+/// Open-loop correlation from a fixed start.
+#[derive(Debug, Clone)]
+struct PullIn {
+    start: Nco,
+    nco: Nco,
+    stretch: Stretch,
+}
+
+/// Periods between two looks at the stretch.
+const LOOK_PERIODS: usize = 20;
+/// Periods before the power of a stretch is judged.
+const JUDGE_PERIODS: usize = 400;
+
+impl Channel {
+    /// A channel on the signal of `hit`.
+    #[must_use]
+    pub fn new(hit: &AcquisitionHit, front_end: FrontEnd, settings: TrackingSettings) -> Self {
+        let mut start = Nco {
+            signal: hit.signal,
+            front_end,
+            tick: hit.tick,
+            code_period: 0,
+            code_phase_chips: 0.0,
+            carrier_phase_cycles: 0.0,
+            doppler_cycles: 0.0,
+            doppler_hz: hit.doppler_hz,
+        };
+        start.shift_code(hit.code_phase_chips);
+        if start.code_phase_chips > 0.0 {
+            start.advance_to(start.tick_of_period(1));
+        }
+        start.code_period = 0;
+        start.doppler_cycles = 0.0;
+        Self {
+            settings,
+            stage: Stage::PullIn(PullIn {
+                start,
+                nco: start,
+                stretch: Stretch::default(),
+            }),
+        }
+    }
+
+    /// The signal.
+    #[must_use]
+    pub fn signal(&self) -> SignalId {
+        match &self.stage {
+            Stage::PullIn(p) => p.nco.signal,
+            Stage::Steady(s) => s.nco.signal,
+            Stage::Lost(signal) => *signal,
+        }
+    }
+
+    /// What the channel sees.
+    #[must_use]
+    pub fn lock(&self) -> Lock {
+        match &self.stage {
+            Stage::PullIn(_) => Lock::PullIn,
+            Stage::Steady(s) => s.lock(),
+            Stage::Lost(_) => Lock::Lost,
+        }
+    }
+
+    /// Since when a signal that should be strong has been missing, if it is.
+    #[must_use]
+    pub fn faded_since(&self) -> Option<u64> {
+        match &self.stage {
+            Stage::Steady(s) => s.faded_since(),
+            Stage::PullIn(_) | Stage::Lost(_) => None,
+        }
+    }
+
+    /// The next correlation; `None` once the signal is lost.
+    #[must_use]
+    pub fn replica(&self) -> Option<Replica> {
+        match &self.stage {
+            Stage::PullIn(p) => {
+                let taps = TapOffsets::early_prompt_late(self.settings.spacing_chips);
+                Some(p.nco.replica(p.nco.tick_of_period(p.nco.nearest_period() + 1), taps))
+            }
+            Stage::Steady(s) => Some(s.replica()),
+            Stage::Lost(_) => None,
+        }
+    }
+
+    /// Takes the sums of the last replica.
+    pub fn update(&mut self, replica: &Replica, taps: &Taps, noise: &NoiseFloor) -> ChannelUpdate {
+        let [early, prompt, late, ..] = *taps.as_slice() else {
+            return ChannelUpdate::default();
+        };
+        let sums = EarlyPromptLate {
+            early,
+            prompt,
+            late,
+        };
+        let variance = noise.variance(taps);
+        match &mut self.stage {
+            Stage::PullIn(p) => {
+                p.stretch.push(sums, variance);
+                p.nco.advance_to(replica.end_tick);
+                self.look_at_stretch()
+            }
+            Stage::Steady(s) => {
+                let bit = s.update(&sums, variance, replica.end_tick);
+                if s.lock() == Lock::Lost {
+                    self.stage = Stage::Lost(s.nco.signal);
+                }
+                ChannelUpdate {
+                    bit,
+                    bit_sync: false,
+                }
+            }
+            Stage::Lost(_) => ChannelUpdate::default(),
+        }
+    }
+
+    /// Moves on from pull-in where the stretch allows, or gives the signal up.
+    fn look_at_stretch(&mut self) -> ChannelUpdate {
+        let Stage::PullIn(p) = &mut self.stage else {
+            return ChannelUpdate::default();
+        };
+        let periods = p.stretch.len();
+        if periods < 2 * LOOK_PERIODS || periods % LOOK_PERIODS != 0 {
+            return ChannelUpdate::default();
+        }
+        let estimate = p.estimate(&self.settings);
+        let lowest = cn0::ratio_hz(self.settings.lowest_cn0_dbhz);
+        match estimate {
+            Some(found) if found.bit_edge.is_some() && found.cn0_hz > lowest => {
+                let steady = p.steady(&found, self.settings);
+                self.stage = Stage::Steady(Box::new(steady));
+                return ChannelUpdate {
+                    bit: None,
+                    bit_sync: true,
+                };
+            }
+            Some(found) if found.cn0_hz > lowest => {
+                if periods >= self.settings.longest_pull_in_periods as usize {
+                    p.restart(&found);
+                }
+            }
+            _ if periods >= JUDGE_PERIODS => self.stage = Stage::Lost(p.nco.signal),
+            _ => {}
+        }
+        ChannelUpdate::default()
+    }
+
+    /// Combines what has come since the previous epoch into one value at `tick`.
+    ///
+    /// In pull-in that is the estimate of the stretch so far; `None` where there is none, or the
+    /// signal is lost.
+    pub fn epoch(&mut self, tick: u64) -> Option<ChannelEpoch> {
+        match &mut self.stage {
+            Stage::PullIn(p) => p.epoch(tick, &self.settings),
+            Stage::Steady(s) => Some(s.epoch(tick)),
+            Stage::Lost(_) => None,
+        }
+    }
+}
+
+impl PullIn {
+    fn period_s(&self) -> f64 {
+        self.start.signal.spec().code_period_s()
+    }
+
+    fn estimate(&self, settings: &TrackingSettings) -> Option<PullInEstimate> {
+        self.stretch.estimate(self.period_s(), settings.spacing_chips)
+    }
+
+    /// The oscillators at the start, corrected by the estimate.
+    ///
+    /// The open-loop replica ran at another code rate: the code offset holds in the middle.
+    fn corrected_start(&self, found: &PullInEstimate) -> Nco {
+        let mut nco = self.start;
+        nco.doppler_hz += found.doppler_offset_hz;
+        let slip_hz = nco.code_rate_hz() - self.start.code_rate_hz();
+        let half_s = self.stretch.len() as f64 / 2.0 * self.period_s();
+        nco.shift_code(found.code_offset_chips - slip_hz * half_s);
+        let to_start = found.doppler_offset_hz * self.period_s() / 2.0;
+        nco.carrier_phase_cycles =
+            (nco.carrier_phase_cycles + found.phase_offset_cycles - to_start).rem_euclid(1.0);
+        nco
+    }
+
+    fn steady(&self, found: &PullInEstimate, settings: TrackingSettings) -> Steady {
+        let mut nco = self.corrected_start(found);
+        let edge = self.start.nearest_period() + i64::from(found.bit_edge.unwrap_or(0));
+        if edge > nco.nearest_period() {
+            nco.advance_to(nco.tick_of_period(edge));
+        }
+        nco.doppler_cycles = 0.0;
+        let averaged_s = self.stretch.len() as f64 * self.period_s();
+        Steady::new(nco, settings, found.cn0_hz, averaged_s)
+    }
+
+    /// Begins a new stretch here, at the Doppler and code phase found.
+    fn restart(&mut self, found: &PullInEstimate) {
+        let mut nco = self.corrected_start(found);
+        nco.advance_to(self.nco.tick);
+        nco.advance_to(nco.tick_of_period(nco.nearest_period() + 1));
+        self.start = nco;
+        self.nco = nco;
+        self.stretch = Stretch::default();
+    }
+
+    fn epoch(&self, tick: u64, settings: &TrackingSettings) -> Option<ChannelEpoch> {
+        let found = self.estimate(settings)?;
+        let mut nco = self.corrected_start(&found);
+        nco.advance_to(tick);
+        let cn0_hz = found.cn0_hz.max(1.0);
+        let length_s = self.stretch.len() as f64 * self.period_s();
+        let spacing = settings.spacing_chips;
+        // Early minus late over the stretch (as a loop of bandwidth 1 / (2 T)), and the bound of
+        // a frequency from a stretch (Rife1974), doubled for the unknown data.
+        let snr = cn0_hz * length_s;
+        let bit_snr = cn0_hz * length_s.min(20.0 * self.period_s());
+        let squaring = 1.0 + 2.0 / ((2.0 - spacing) * bit_snr);
+        let tau = std::f64::consts::TAU;
+        let last = self.stretch.last()?;
+        Some(ChannelEpoch {
+            signal: nco.signal,
+            tick,
+            code_period: nco.code_period,
+            code_phase_chips: nco.code_phase_chips,
+            code_variance_chips2: spacing / (4.0 * snr) * squaring,
+            doppler_hz: nco.doppler_hz,
+            doppler_variance_hz2: 12.0 / (tau * tau * snr * length_s * length_s),
+            doppler_cycles: nco.doppler_cycles,
+            phase_slipped: true,
+            cn0_dbhz: cn0::dbhz(cn0_hz),
+            lock: Lock::PullIn,
+            prompt: last.prompt / self.stretch.noise_variance().sqrt(),
+            code_error_chips: found.code_offset_chips,
+            frequency_error_hz: found.doppler_offset_hz,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::simulated::IdealSignal;
+    use super::*;
+    use crate::CorrelatorBank;
+
+    struct Run {
+        channel: Channel,
+        noise: NoiseFloor,
+        bits: Vec<NavBit>,
+    }
+
+    impl Run {
+        fn new(signal: &IdealSignal, code_error: f64, doppler_error: f64) -> Self {
+            let hit = signal.hit(code_error, doppler_error);
+            let settings = TrackingSettings::default();
+            let unused = SignalId::gps_l1_ca(37).unwrap();
+            Self {
+                channel: Channel::new(&hit, signal.front_end, settings),
+                noise: NoiseFloor::new(unused, signal.front_end).unwrap(),
+                bits: Vec::new(),
+            }
+        }
+
+        /// Tracks up to `time_s` and returns the epoch there.
+        fn to(&mut self, signal: &mut IdealSignal, time_s: f64) -> Option<ChannelEpoch> {
+            let tick = (time_s * signal.front_end.sample_rate_hz).round() as u64;
+            let mut taps = Vec::new();
+            while let Some(replica) = self.channel.replica().filter(|r| r.end_tick <= tick) {
+                signal.correlate(&[replica], &mut taps).unwrap();
+                let update = self.channel.update(&replica, &taps[0], &self.noise);
+                self.bits.extend(update.bit);
+            }
+            self.channel.epoch(tick)
+        }
+    }
+
+    fn code_error(signal: &IdealSignal, epoch: &ChannelEpoch) -> f64 {
+        let t = epoch.tick as f64 / signal.front_end.sample_rate_hz;
+        (epoch.code_phase_chips - signal.chips_at(t) + 511.5).rem_euclid(1023.0) - 511.5
+    }
+
+    #[test]
+    fn follows_a_signal_from_its_first_bit_and_reports_honest_variances() {
+        for (seed, cn0) in [(1, 33.0), (2, 38.0), (3, 45.0)] {
+            let mut signal = IdealSignal::new(cn0, seed);
+            let mut run = Run::new(&signal, 0.12, 21.0);
+            let (mut code, mut doppler) = (0.0, 0.0);
+            for k in 1..=100 {
+                let t = 0.1 * f64::from(k);
+                let epoch = run.to(&mut signal, t).unwrap();
+                if k > 20 {
+                    assert_eq!(epoch.lock, Lock::Carrier, "{cn0} dB-Hz at {t} s");
+                    code += code_error(&signal, &epoch).powi(2) / epoch.code_variance_chips2;
+                    let truth = signal.doppler_hz + signal.doppler_rate_hz_s * t;
+                    doppler += (epoch.doppler_hz - truth).powi(2) / epoch.doppler_variance_hz2;
+                    // 1 s of smoothing.
+                    assert!((epoch.cn0_dbhz - cn0).abs() < 1.0);
+                }
+            }
+            // Code errors are correlated over some 5 s, so their mean square over 8 s spreads
+            // widely about 1; Doppler errors of successive epochs are independent but for the
+            // acceleration, 80 of them spread by 0.16.
+            assert!(code / 80.0 < 5.0, "code {} at {cn0}", code / 80.0);
+            let ratio = doppler / 80.0;
+            assert!((0.6..2.0).contains(&ratio), "Doppler {ratio} at {cn0}");
+            // 10 s, from the first whole bit on (code phase 5000 of 20460 chips: 15.1 ms).
+            assert!((498..=499).contains(&run.bits.len()));
+            assert_eq!(run.bits[0].code_period % 20, run.bits[1].code_period % 20);
+            let polarity = f64::from(run.bits[300].soft).signum() * signal.bit_at(bit_middle(300));
+            for (k, bit) in run.bits.iter().enumerate().skip(5) {
+                let sent = signal.bit_at(bit_middle(k)) * polarity;
+                assert_eq!(f64::from(bit.soft).signum(), sent, "bit {k} at {cn0}");
+            }
+        }
+    }
+
+    /// Middle of the k-th whole bit of the ideal signal, s.
+    fn bit_middle(k: usize) -> f64 {
+        (20_460.0 - 5_000.3) / 1.023e6 + 0.02 * (k as f64 + 0.5)
+    }
+
+    #[test]
+    fn a_lost_signal_is_noticed_at_once_and_given_up_in_time() {
+        let mut signal = IdealSignal::new(42.0, 7);
+        signal.ends_s = 5.0;
+        let mut run = Run::new(&signal, 0.0, 0.0);
+        run.to(&mut signal, 5.0);
+        assert_eq!(run.channel.faded_since(), None);
+        run.to(&mut signal, 5.03);
+        let since = run.channel.faded_since().unwrap();
+        // Within one integration of 10 ms.
+        assert!((since as f64 / 2.6e6 - 5.0).abs() < 0.011);
+        assert_eq!(run.to(&mut signal, 15.0), None);
+        assert_eq!(run.channel.lock(), Lock::Lost);
+    }
+
+    #[test]
+    fn a_channel_on_noise_gives_up() {
+        let mut signal = IdealSignal::new(45.0, 8);
+        signal.ends_s = 0.0;
+        let mut run = Run::new(&signal, 0.0, 0.0);
+        run.to(&mut signal, 3.0);
+        assert_eq!(run.channel.lock(), Lock::Lost);
+        assert!(run.bits.is_empty());
+    }
+
+    #[test]
+    fn a_short_stretch_already_has_an_epoch() {
+        let mut signal = IdealSignal::new(43.0, 9);
+        let mut run = Run::new(&signal, 0.1, 30.0);
+        let epoch = run.to(&mut signal, 0.035).unwrap();
+        assert_eq!(epoch.lock, Lock::PullIn);
+        // Four reported sigmas.
+        assert!(code_error(&signal, &epoch).powi(2) < 16.0 * epoch.code_variance_chips2);
+    }
+}

@@ -1,0 +1,127 @@
+//! The pre-filter: all integrations of a navigation epoch combined into one value.
+
+use num_complex::Complex64;
+
+use super::Lock;
+use crate::SignalId;
+
+/// What a channel says at a navigation epoch.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ChannelEpoch {
+    /// The signal.
+    pub signal: SignalId,
+    /// The tick at which the state holds: that of the epoch.
+    pub tick: u64,
+    /// Code periods completed since the channel's first began.
+    pub code_period: i64,
+    /// Code phase, chips, in [0, code length).
+    pub code_phase_chips: f64,
+    /// Its variance, chips^2.
+    pub code_variance_chips2: f64,
+    /// Doppler, Hz.
+    pub doppler_hz: f64,
+    /// Its variance, Hz^2.
+    pub doppler_variance_hz2: f64,
+    /// Integral of the Doppler since the channel's start, cycles.
+    pub doppler_cycles: f64,
+    /// Phase lock was lost since the previous epoch.
+    pub phase_slipped: bool,
+    /// C/N0, smoothed, dB-Hz.
+    pub cn0_dbhz: f64,
+    /// What the channel sees.
+    pub lock: Lock,
+    /// Prompt sum of the last integration over the noise deviation.
+    pub prompt: Complex64,
+    /// Mean code error of the epoch's integrations, chips.
+    pub code_error_chips: f64,
+    /// Mean frequency error of the epoch's integrations, Hz.
+    pub frequency_error_hz: f64,
+}
+
+/// One integration as the pre-filter takes it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Integration {
+    /// Middle of the integration, s on the channel's clock.
+    pub(super) middle_s: f64,
+    /// Measured integral of the Doppler at the middle, cycles.
+    pub(super) phase_cycles: f64,
+    pub(super) code_error_chips: f64,
+    pub(super) frequency_error_hz: f64,
+}
+
+/// The integrations since the previous epoch.
+#[derive(Debug, Clone, Default)]
+pub(super) struct PreFilter {
+    held: Vec<Integration>,
+}
+
+/// A straight line through the phases of an epoch.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct PhaseLine {
+    /// Time at which the slope holds best, s.
+    pub(super) middle_s: f64,
+    /// Doppler, Hz.
+    pub(super) slope_hz: f64,
+    /// Sum of squared distances from the middle, s^2: slope variance = phase variance / spread.
+    pub(super) spread_s2: f64,
+}
+
+impl PreFilter {
+    pub(super) fn push(&mut self, integration: Integration) {
+        self.held.push(integration);
+    }
+
+    /// Least-squares line through the phases; `None` with fewer than two integrations.
+    pub(super) fn phase_line(&self) -> Option<PhaseLine> {
+        let n = self.held.len() as f64;
+        let middle_s = self.held.iter().map(|i| i.middle_s).sum::<f64>() / n;
+        let spread_s2: f64 = self.held.iter().map(|i| (i.middle_s - middle_s).powi(2)).sum();
+        let phases = self.held.iter().map(|i| (i.middle_s - middle_s) * i.phase_cycles);
+        (spread_s2 > 0.0).then(|| PhaseLine {
+            middle_s,
+            slope_hz: phases.sum::<f64>() / spread_s2,
+            spread_s2,
+        })
+    }
+
+    /// Mean code error, chips, and frequency error, Hz.
+    pub(super) fn mean_errors(&self) -> (f64, f64) {
+        let n = self.held.len().max(1) as f64;
+        let code = self.held.iter().map(|i| i.code_error_chips).sum::<f64>();
+        let frequency = self.held.iter().map(|i| i.frequency_error_hz).sum::<f64>();
+        (code / n, frequency / n)
+    }
+
+    pub(super) fn clear(&mut self) {
+        self.held.clear();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_abs_diff_eq;
+
+    #[test]
+    fn the_line_has_the_slope_of_the_phase() {
+        let mut filter = PreFilter::default();
+        for k in 0..10 {
+            let middle_s = 3.0 + 0.01 * f64::from(k);
+            filter.push(Integration {
+                middle_s,
+                phase_cycles: 1000.0 + 123.0 * middle_s,
+                code_error_chips: 0.1,
+                frequency_error_hz: -0.5,
+            });
+        }
+        let line = filter.phase_line().unwrap();
+        // Rounding of phases near 1000 over 0.1 s.
+        assert_abs_diff_eq!(line.slope_hz, 123.0, epsilon = 1e-9);
+        assert_abs_diff_eq!(line.middle_s, 3.045, epsilon = 1e-12);
+        let (code, frequency) = filter.mean_errors();
+        assert_abs_diff_eq!(code, 0.1, epsilon = 1e-12);
+        assert_abs_diff_eq!(frequency, -0.5, epsilon = 1e-12);
+        filter.clear();
+        assert_eq!(filter.phase_line(), None);
+    }
+}

@@ -1,0 +1,21 @@
+//! Scalar tracking of one signal: pull-in, loops, lock, bits, and the pre-filter.
+
+pub mod channel;
+pub mod cn0;
+pub mod discriminator;
+mod epoch;
+mod lock;
+pub mod loop_filter;
+mod nco;
+mod noise;
+mod pull_in;
+mod settings;
+#[cfg(test)]
+mod simulated;
+mod steady;
+
+pub use channel::{Channel, ChannelUpdate, NavBit};
+pub use epoch::ChannelEpoch;
+pub use lock::Lock;
+pub use noise::NoiseFloor;
+pub use settings::TrackingSettings;
