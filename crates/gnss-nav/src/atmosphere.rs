@@ -1,0 +1,81 @@
+//! Delays of the ionosphere (Klobuchar) and the troposphere (Saastamoinen).
+
+use std::f64::consts::PI;
+
+use crate::GpsTime;
+use crate::constants::SPEED_OF_LIGHT_MPS;
+use crate::geodesy::{Geodetic, Look};
+
+/// Heights over which the models speak, m; outside they give no delay.
+const LOWEST_M: f64 = -1_000.0;
+const TROPOSPHERE_TOP_M: f64 = 20_000.0;
+
+/// Relative humidity of the standard atmosphere.
+const HUMIDITY: f64 = 0.7;
+
+/// Broadcast parameters of the Klobuchar model (IS-GPS-200 20.3.3.5.2.5).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Klobuchar {
+    /// Amplitude polynomial: s, s/semicircle, s/semicircle^2, s/semicircle^3.
+    pub alpha: [f64; 4],
+    /// Period polynomial: s, s/semicircle, s/semicircle^2, s/semicircle^3.
+    pub beta: [f64; 4],
+}
+
+impl Klobuchar {
+    /// Delay of L1, m, of a signal arriving at `receiver` from `look` at `time`; zero below the
+    /// horizontal and more than 1 km under the ellipsoid.
+    ///
+    /// IS-GPS-200 figure 20-4; removes about half of the true delay (rms).
+    #[must_use]
+    pub fn delay_m(&self, receiver: &Geodetic, look: &Look, time: GpsTime) -> f64 {
+        let elevation = look.elevation_rad / PI;
+        if elevation <= 0.0 || receiver.height_m < LOWEST_M {
+            return 0.0;
+        }
+        // All angles in semicircles: earth angle, pierce point, its geomagnetic latitude.
+        let earth = 0.0137 / (elevation + 0.11) - 0.022;
+        let lat = (receiver.lat_rad / PI + earth * look.azimuth_rad.cos()).clamp(-0.416, 0.416);
+        let lon = receiver.lon_rad / PI + earth * look.azimuth_rad.sin() / (lat * PI).cos();
+        let magnetic = lat + 0.064 * ((lon - 1.617) * PI).cos();
+        let local_s = (43_200.0 * lon + time.tow_s()).rem_euclid(86_400.0);
+        let slant = 1.0 + 16.0 * (0.53 - elevation).powi(3);
+        let phase =
+            2.0 * PI * (local_s - 50_400.0) / polynomial(&self.beta, magnetic).max(72_000.0);
+        let mut delay_s = 5e-9;
+        if phase.abs() < 1.57 {
+            let square = phase * phase;
+            let cosine = 1.0 - square / 2.0 + square * square / 24.0;
+            delay_s += polynomial(&self.alpha, magnetic).max(0.0) * cosine;
+        }
+        SPEED_OF_LIGHT_MPS * slant * delay_s
+    }
+}
+
+fn polynomial(coefficients: &[f64; 4], x: f64) -> f64 {
+    coefficients.iter().rev().fold(0.0, |sum, c| sum * x + c)
+}
+
+/// Delay of the troposphere, m, at elevation `elevation_rad`; zero below the horizontal, above
+/// 20 km and more than 1 km under the ellipsoid.
+///
+/// Saastamoinen (1972) with a standard atmosphere, as RTKLIB's `tropmodel` with 70 % humidity:
+/// p = 1013.25 (1 - 2.2557e-5 h)^5.2568 hPa, T = 288.16 - 6.5e-3 h K (constant above 11 km),
+/// e = 6.108 * 0.7 exp((17.15 T - 4684) / (T - 38.45)) hPa, h the height, not less than 0;
+/// dry 0.0022768 p / (1 - 0.00266 cos(2 lat) - 0.00028 h/km), wet 0.002277 (1255 / T + 0.05) e,
+/// both divided by the sine of the elevation (optimistic below 5 degrees).
+#[must_use]
+pub fn saastamoinen_delay_m(receiver: &Geodetic, elevation_rad: f64) -> f64 {
+    if elevation_rad <= 0.0 || !(LOWEST_M..=TROPOSPHERE_TOP_M).contains(&receiver.height_m) {
+        return 0.0;
+    }
+    let height_m = receiver.height_m.max(0.0);
+    let pressure_hpa = 1013.25 * (1.0 - 2.2557e-5 * height_m).powf(5.2568);
+    let temperature_k = 288.16 - 6.5e-3 * height_m.min(11_000.0);
+    let vapour_hpa =
+        6.108 * HUMIDITY * ((17.15 * temperature_k - 4684.0) / (temperature_k - 38.45)).exp();
+    let gravity = 1.0 - 0.002_66 * (2.0 * receiver.lat_rad).cos() - 0.000_28 * height_m / 1e3;
+    let dry_m = 0.002_276_8 * pressure_hpa / gravity;
+    let wet_m = 0.002_277 * (1255.0 / temperature_k + 0.05) * vapour_hpa;
+    (dry_m + wet_m) / elevation_rad.sin().max(1e-3)
+}

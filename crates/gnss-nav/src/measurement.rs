@@ -1,0 +1,225 @@
+//! Pseudoranges and range rates, and the model that predicts them.
+
+use nalgebra::Vector3;
+
+use crate::atmosphere::{Klobuchar, saastamoinen_delay_m};
+use crate::constants::SPEED_OF_LIGHT_MPS;
+use crate::geodesy::{Geodetic, Look};
+use crate::line_of_sight::LineOfSight;
+use crate::{EphemerisStore, GpsTime, NavError, SatelliteId, SatelliteState};
+
+/// What a channel measured at one epoch.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RawMeasurement {
+    /// Of which satellite.
+    pub satellite: SatelliteId,
+    /// Reading of the satellite's clock when it sent what arrives at the epoch.
+    pub transmit_time: GpsTime,
+    /// c times (epoch by the receiver's clock - `transmit_time`), m.
+    pub pseudorange_m: f64,
+    /// Rate of the pseudorange, m/s: minus Doppler times the wavelength of L1.
+    pub range_rate_mps: f64,
+    /// Variance of the pseudorange by tracking noise, m^2.
+    pub pseudorange_variance_m2: f64,
+    /// Variance of the range rate, (m/s)^2; infinite where no Doppler was measured.
+    pub range_rate_variance_m2: f64,
+    /// Carrier-to-noise density, dB-Hz.
+    pub cn0_dbhz: f64,
+}
+
+impl RawMeasurement {
+    /// A measurement whose pseudorange is the epoch minus the transmit time.
+    #[must_use]
+    pub fn pseudorange_m(receive_time: GpsTime, transmit_time: GpsTime) -> f64 {
+        SPEED_OF_LIGHT_MPS * (receive_time - transmit_time)
+    }
+}
+
+/// A measurement with the state of its satellite at transmission.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Measurement {
+    /// Of which satellite.
+    pub satellite: SatelliteId,
+    /// The epoch, by the receiver's clock.
+    pub receive_time: GpsTime,
+    /// Pseudorange, m.
+    pub pseudorange_m: f64,
+    /// Rate of the pseudorange, m/s.
+    pub range_rate_mps: f64,
+    /// Variance of the pseudorange by tracking noise, m^2.
+    pub pseudorange_variance_m2: f64,
+    /// Variance of the range rate, (m/s)^2; infinite where no Doppler was measured.
+    pub range_rate_variance_m2: f64,
+    /// Carrier-to-noise density, dB-Hz.
+    pub cn0_dbhz: f64,
+    /// The satellite at transmission, in the frame of transmission.
+    pub state: SatelliteState,
+}
+
+/// Measurements of one epoch, and what could not be used.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Formed {
+    /// In the order given.
+    pub measurements: Vec<Measurement>,
+    /// Without a valid ephemeris, or with values that are not finite.
+    pub rejected: Vec<(SatelliteId, Rejection)>,
+}
+
+/// Why a measurement cannot be used.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum Rejection {
+    /// No ephemeris of this satellite is valid at the epoch.
+    NoEphemeris,
+    /// The ephemeris gives no state.
+    Ephemeris(NavError),
+    /// Pseudorange or variance is not finite, or the variance is not positive.
+    Value,
+}
+
+/// Joins `raw`, measured when the receiver's clock read `receive_time`, with satellite states.
+#[must_use]
+pub fn form(receive_time: GpsTime, raw: &[RawMeasurement], store: &EphemerisStore) -> Formed {
+    let mut formed = Formed::default();
+    for one in raw {
+        match join(receive_time, one, store) {
+            Ok(measurement) => formed.measurements.push(measurement),
+            Err(reason) => formed.rejected.push((one.satellite, reason)),
+        }
+    }
+    formed
+}
+
+fn join(
+    receive_time: GpsTime,
+    raw: &RawMeasurement,
+    store: &EphemerisStore,
+) -> Result<Measurement, Rejection> {
+    let variance = raw.pseudorange_variance_m2;
+    if !(raw.pseudorange_m.is_finite() && variance.is_finite() && variance > 0.0) {
+        return Err(Rejection::Value);
+    }
+    let ephemeris = store
+        .select(raw.satellite, raw.transmit_time)
+        .ok_or(Rejection::NoEphemeris)?;
+    let (_, state) = ephemeris
+        .state_at_transmission(raw.transmit_time)
+        .map_err(Rejection::Ephemeris)?;
+    Ok(Measurement {
+        satellite: raw.satellite,
+        receive_time,
+        pseudorange_m: raw.pseudorange_m,
+        range_rate_mps: raw.range_rate_mps,
+        pseudorange_variance_m2: variance,
+        range_rate_variance_m2: raw.range_rate_variance_m2,
+        cn0_dbhz: raw.cn0_dbhz,
+        state,
+    })
+}
+
+/// Variance that tracking noise does not cover.
+///
+/// sigma^2 = signal_in_space^2 + (ionosphere_fraction I)^2 + (troposphere_fraction T)^2, where I
+/// and T are the modelled delays: a delay that is switched off adds nothing.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ErrorModel {
+    /// Broadcast orbit and clock, multipath, m.
+    pub signal_in_space_m: f64,
+    /// Part of the modelled ionospheric delay left over.
+    pub ionosphere_fraction: f64,
+    /// Part of the modelled tropospheric delay left over.
+    pub troposphere_fraction: f64,
+}
+
+impl ErrorModel {
+    /// Tracking noise alone: for signals simulated with exactly the modelled delays.
+    pub const TRACKING_NOISE_ONLY: Self = Self {
+        signal_in_space_m: 0.0,
+        ionosphere_fraction: 0.0,
+        troposphere_fraction: 0.0,
+    };
+}
+
+impl Default for ErrorModel {
+    /// For real signals: 1 m (the global average of the user range error by the GPS SPS
+    /// Performance Standard is below 2 m at 95 %), half the Klobuchar delay (what it leaves, by
+    /// IS-GPS-200 20.3.3.5.2.5), 5 % of the troposphere (0.12 m at the zenith).
+    fn default() -> Self {
+        Self {
+            signal_in_space_m: 1.0,
+            ionosphere_fraction: 0.5,
+            troposphere_fraction: 0.05,
+        }
+    }
+}
+
+/// Which delays are modelled, how well, and from which elevation on satellites are used.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct MeasurementModel {
+    /// Ionosphere by these parameters; `None`: no ionospheric delay.
+    pub ionosphere: Option<Klobuchar>,
+    /// Whether Saastamoinen's troposphere is modelled.
+    pub troposphere: bool,
+    /// Satellites below are not used, rad.
+    pub elevation_mask_rad: f64,
+    /// Variance beyond tracking noise.
+    pub errors: ErrorModel,
+}
+
+/// A pseudorange predicted for a position, without the receiver's clock.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Predicted {
+    /// Range, minus the satellite's clock, plus modelled delays, m.
+    pub pseudorange_m: f64,
+    /// Variance of the delays and of the signal in space, m^2.
+    pub model_variance_m2: f64,
+    /// Geometry.
+    pub line_of_sight: LineOfSight,
+    /// Where the satellite stands in the sky.
+    pub look: Look,
+}
+
+impl MeasurementModel {
+    /// |r_sv - r| - c dt_sv + I + T for a receiver at `receiver_ecef_m` at about `time`.
+    #[must_use]
+    pub fn predict(
+        &self,
+        state: &SatelliteState,
+        receiver_ecef_m: &Vector3<f64>,
+        time: GpsTime,
+    ) -> Predicted {
+        let line_of_sight = LineOfSight::new(state, receiver_ecef_m);
+        let geodetic = Geodetic::from_ecef(receiver_ecef_m);
+        let look = geodetic.look(&line_of_sight.unit_ecef);
+        let ionosphere_m = self
+            .ionosphere
+            .map_or(0.0, |klobuchar| klobuchar.delay_m(&geodetic, &look, time));
+        let troposphere_m = if self.troposphere {
+            saastamoinen_delay_m(&geodetic, look.elevation_rad)
+        } else {
+            0.0
+        };
+        let errors = &self.errors;
+        Predicted {
+            pseudorange_m: line_of_sight.range_m - SPEED_OF_LIGHT_MPS * state.clock_bias_s
+                + ionosphere_m
+                + troposphere_m,
+            model_variance_m2: errors.signal_in_space_m.powi(2)
+                + (errors.ionosphere_fraction * ionosphere_m).powi(2)
+                + (errors.troposphere_fraction * troposphere_m).powi(2),
+            line_of_sight,
+            look,
+        }
+    }
+
+    /// This model without delays, mask and model errors: for a position not yet known.
+    #[must_use]
+    pub(crate) fn geometry_only() -> Self {
+        Self {
+            ionosphere: None,
+            troposphere: false,
+            elevation_mask_rad: -std::f64::consts::FRAC_PI_2,
+            errors: ErrorModel::TRACKING_NOISE_ONLY,
+        }
+    }
+}
