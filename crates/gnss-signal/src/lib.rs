@@ -7,8 +7,9 @@ mod ca_code;
 mod error;
 pub mod sample;
 mod signal;
+pub mod tracking;
 
-pub use acquisition::AcquisitionEngine;
+pub use acquisition::{AcquisitionEngine, default_search};
 pub use bank::{
     AcquisitionHit, CorrelatorBank, MAX_TAPS, Replica, SearchReport, SearchRequest, TapOffsets,
     Taps,
