@@ -7,8 +7,9 @@
 //!    code phases; powers are summed over the blocks, following the code Doppler. The best cells
 //!    are looked at again on a grid twice as fine in both directions.
 //! 4. [`threshold`]: from the false-alarm probability of the whole request.
-//! 5. [`cross_correlation`]: drops what stronger satellites explain.
-//! 6. [`refine`]: Doppler, code phase and C/N0 from sums of one code period.
+//! 5. [`refine`]: Doppler, code phase and C/N0 from sums of one code period.
+//! 6. Hits so weak that they may be the cross-correlation of a stronger satellite are dropped,
+//!    one of those found or one not searched for (SBAS and QZSS send codes of the same family).
 //!
 //! A data bit edge inside a coherent block costs up to all of that block: of blocks of N code
 //! periods one in 20 / N holds an edge, and every other edge is a change of sign. Blocks of 1 to 5
@@ -16,8 +17,8 @@
 
 mod baseband;
 mod code_spectrum;
-mod cross_correlation;
 mod grid;
+mod kernels;
 mod refine;
 mod search;
 mod spectra;
@@ -30,10 +31,11 @@ use rustfft::FftPlanner;
 
 use crate::{AcquisitionHit, FrontEnd, SearchReport, SearchRequest, Signal, SignalError, SignalId};
 use baseband::Baseband;
-use cross_correlation::{Detection, without_cross_correlation};
 use grid::Grid;
-use search::{CodeSearch, Searcher};
+use refine::{Refined, refine};
+use search::{Cell, CodeSearch, Searcher};
 use spectra::Spectra;
+use threshold::{Thresholds, thresholds};
 
 /// Samples in one code period at the acquisition rate: the main lobe of the code, in a length that
 /// transforms fast.
@@ -46,6 +48,12 @@ const ACQUISITION_RATE_HZ: f64 = 2.048e6;
 const MAX_COHERENT_PERIODS: u32 = 20;
 /// Longest search, code periods; bounds memory (48 KiB a period).
 const MAX_PERIODS: u64 = 500;
+
+/// Least C/N0 of a hit, dB-Hz: what a signal of 52 dB-Hz, the strongest received from the sky,
+/// leaves by cross-correlation (-21.6 dB at the worst Doppler difference), and 0.6 dB.
+const LEAST_CN0_DBHZ: f64 = 31.0;
+/// A hit weaker than the strongest by more than this may be its cross-correlation, dB.
+const CROSS_CORRELATION_DB: f64 = 20.5;
 
 /// Duration of one code period, s.
 fn code_period_s() -> f64 {
@@ -122,29 +130,36 @@ impl AcquisitionEngine {
         let spectra = Spectra::new(grid, baseband, &mut self.planner);
         let cells = grid.cells_per_code() * request.signals.len().max(1) as f64;
         let sums = grid.blocks as u32;
-        let threshold = threshold::threshold(sums, cells, request.false_alarm_probability)?;
+        let thresholds = thresholds(sums, cells, request.false_alarm_probability)?;
         let codes: Vec<&[Complex32]> = request
             .signals
             .iter()
             .filter_map(|signal| self.codes.get(signal).map(Vec::as_slice))
             .collect();
-        let searches = search_all(&spectra, &codes, threshold, self.threads);
-        let kept = detections(&searches, threshold);
-        let kept = without_cross_correlation(kept, &codes, grid, &mut self.planner);
-        let hits = kept
-            .iter()
-            .map(|found| {
-                let noise = searches[found.index].noise_power / grid.coherent as f64;
-                let code = codes[found.index];
-                let refined = refine::refine(&spectra, code, found.cell, noise, &mut self.planner);
-                hit(request, found, refined, threshold, self.band_gain)
-            })
-            .collect();
-        Ok(SearchReport {
-            best_missed: best_missed(request, &searches, &kept),
-            hits,
-            threshold,
-        })
+        let searches = search_all(&spectra, &codes, thresholds, self.threads);
+        let mut report = SearchReport {
+            hits: Vec::new(),
+            best_missed: None,
+            threshold: thresholds.sum,
+        };
+        for ((signal, code), search) in request.signals.iter().zip(codes).zip(&searches) {
+            let Some(cell) = search.cells.first() else {
+                continue;
+            };
+            if cell.statistic > thresholds.sum {
+                let noise = search.noise_power / grid.coherent as f64;
+                let refined = refine(&spectra, code, *cell, noise, &mut self.planner);
+                let tick = request.start_tick;
+                let gain = self.band_gain;
+                let hit = hit(*signal, tick, *cell, thresholds.sum, refined, gain);
+                report.hits.push(hit);
+            } else if report.best_missed.is_none_or(|(_, s)| cell.statistic > s) {
+                report.best_missed = Some((*signal, cell.statistic));
+            }
+        }
+        drop_cross_correlation(&mut report.hits);
+        report.hits.sort_by_key(|hit| hit.signal);
+        Ok(report)
     }
 }
 
@@ -172,14 +187,14 @@ fn check_front_end(front_end: FrontEnd) -> Result<(), SignalError> {
 fn search_all(
     spectra: &Spectra,
     codes: &[&[Complex32]],
-    threshold: f64,
+    thresholds: Thresholds,
     threads: usize,
 ) -> Vec<CodeSearch> {
     let search_run = |codes: &[&[Complex32]]| -> Vec<CodeSearch> {
         let mut searcher = Searcher::new(&mut FftPlanner::new());
         codes
             .iter()
-            .map(|code| searcher.search(spectra, code, threshold))
+            .map(|code| searcher.search(spectra, code, thresholds))
             .collect()
     };
     let run = codes.len().div_ceil(threads).max(1);
@@ -201,51 +216,46 @@ fn search_all(
     })
 }
 
-fn detections(searches: &[CodeSearch], threshold: f64) -> Vec<Detection> {
-    let mut found = Vec::new();
-    for (index, search) in searches.iter().enumerate() {
-        let above = search.cells.iter().filter(|c| c.statistic > threshold);
-        found.extend(above.map(|cell| Detection { index, cell: *cell }));
-    }
-    found
+/// Keeps the hits that the cross-correlation of no stronger signal can explain.
+fn drop_cross_correlation(hits: &mut Vec<AcquisitionHit>) {
+    let strongest = hits.iter().map(|hit| hit.cn0_dbhz).fold(0.0, f64::max);
+    let least = LEAST_CN0_DBHZ.max(strongest - CROSS_CORRELATION_DB);
+    hits.retain(|hit| hit.cn0_dbhz >= least);
 }
 
 fn hit(
-    request: &SearchRequest,
-    found: &Detection,
-    refined: refine::Refined,
+    signal: SignalId,
+    tick: u64,
+    cell: Cell,
     threshold: f64,
+    refined: Refined,
     band_gain: f64,
 ) -> AcquisitionHit {
-    let signal = request.signals[found.index];
     let chips = f64::from(signal.spec().code_length_chips);
     let phase = (-refined.delay_samples * chips / POINTS as f64).rem_euclid(chips);
     let cn0_hz = refined.period_snr / (band_gain * code_period_s());
     AcquisitionHit {
         signal,
-        tick: request.start_tick,
+        tick,
         // rem_euclid of a tiny negative number rounds up to the modulus itself.
         code_phase_chips: if phase < chips { phase } else { 0.0 },
         doppler_hz: refined.doppler_hz,
-        statistic: found.cell.statistic,
+        statistic: cell.statistic,
         threshold,
         cn0_dbhz: 10.0 * cn0_hz.max(1.0).log10(),
     }
 }
 
-/// The largest statistic among the codes without a hit.
-fn best_missed(
-    request: &SearchRequest,
-    searches: &[CodeSearch],
-    kept: &[Detection],
-) -> Option<(SignalId, f64)> {
-    searches
-        .iter()
-        .enumerate()
-        .filter(|(index, _)| kept.iter().all(|found| found.index != *index))
-        .filter_map(|(index, search)| {
-            let cell = search.cells.first()?;
-            Some((request.signals[index], cell.statistic))
-        })
-        .max_by(|a, b| a.1.total_cmp(&b.1))
+/// A plan that finds what can be found in `duration_ms` of samples: code periods to integrate
+/// coherently, and how many of those to sum by power.
+///
+/// Up to 19 ms: sums of single periods, which no data bit can cancel. From 20 ms on: blocks of four
+/// periods (a bit edge falls into one in five), up to 60 ms, which reaches 33 dB-Hz.
+#[must_use]
+pub fn default_search(duration_ms: u32) -> (u32, u32) {
+    match duration_ms {
+        0..20 => (1, duration_ms.max(1)),
+        20..60 => (4, duration_ms / 4),
+        _ => (4, 15),
+    }
 }

@@ -1,7 +1,8 @@
 //! Doppler, code phase and C/N0 of a detection, from partial sums of one code period each.
 //!
-//! The sums of a data bit are added coherently, for every position the bit edge can have; the
-//! largest power over frequency and edge is the maximum-likelihood estimate that needs no data.
+//! The sums of a data bit are added coherently, for every position the bit edge can have, and
+//! neighbouring bits with whichever relative sign gives more power. (Without that sign, one change
+//! of sign in a few milliseconds looks like a frequency half a bin off.)
 
 use num_complex::{Complex32, Complex64};
 use rustfft::FftPlanner;
@@ -20,6 +21,12 @@ const FIT_STEP: i64 = 4;
 const FIT_RANGE: i64 = 5;
 /// Frequencies tried within the inverse of the longest coherent sum.
 const STEPS_PER_BIN: f64 = 8.0;
+
+/// Farthest that the Doppler may lie from the detected bin, Hz: a quarter of a bin of the shortest
+/// coherent integration, and noise.
+const MAX_RANGE_HZ: f64 = 300.0;
+/// Periods from which on the phases of their sums say more than the power within each.
+const PHASE_PERIODS: usize = 3;
 
 /// Refined values of one detection.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -52,21 +59,37 @@ pub(super) fn refine(
     planner: &mut FftPlanner<f32>,
 ) -> Refined {
     let replicas = Replicas::new(code, planner);
-    let bin_hz = 0.5 / spectra.grid().block_s();
+    // A change of sign inside a coherent block splits its peak: 0.8 of a bin covers both parts.
+    let range_hz = (0.8 / spectra.grid().block_s()).min(MAX_RANGE_HZ);
     let mut doppler_hz = spectra.grid().doppler_hz(cell.quarter);
     let mut position = (cell.delay_samples * SUBSAMPLES as f64).round() as i64;
+    if spectra.grid().periods() < PHASE_PERIODS {
+        doppler_hz += power_vertex(spectra, &replicas, doppler_hz, position);
+    }
     let sums = partial_sums(spectra, &replicas, doppler_hz, position);
-    let fit = best_fit(&sums, 0.6 * bin_hz);
+    let fit = best_fit(&sums, range_hz);
     doppler_hz += fit.offset_hz;
     let delay_samples = fit_delay(spectra, &replicas, doppler_hz, position, fit.edge);
     position = (delay_samples * SUBSAMPLES as f64).round() as i64;
     let sums = partial_sums(spectra, &replicas, doppler_hz, position);
-    let fit = best_fit(&sums, 0.2 * bin_hz);
+    let fit = best_fit(&sums, 0.25 * range_hz);
     Refined {
         doppler_hz: doppler_hz + fit.offset_hz,
         delay_samples: delay_samples.rem_euclid(POINTS as f64),
         period_snr: period_snr(&sums, fit, noise_power),
     }
+}
+
+/// Distance to the Doppler of the largest power of single periods, Hz.
+fn power_vertex(spectra: &Spectra, replicas: &Replicas, doppler_hz: f64, position: i64) -> f64 {
+    let step_hz = 0.25 / code_period_s();
+    let power = |offset_hz: f64| -> f64 {
+        partial_sums(spectra, replicas, doppler_hz + offset_hz, position)
+            .iter()
+            .map(Complex64::norm_sqr)
+            .sum()
+    };
+    step_hz * vertex(power(-step_hz), power(0.0), power(step_hz))
 }
 
 impl Replicas {
@@ -151,6 +174,9 @@ fn mix(samples: &[Complex32], carrier: &[Complex32], mixed: &mut [Complex32]) {
 /// Best frequency within `range_hz` of the one wiped off, over all positions of the bit edge.
 fn best_fit(sums: &[Complex64], range_hz: f64) -> BitFit {
     let bit = Signal::GpsL1Ca.spec().code_periods_per_bit as usize;
+    if sums.len() < PHASE_PERIODS {
+        return best_edge(sums, 0.0);
+    }
     let longest = sums.len().min(bit);
     let step_hz = 1.0 / (STEPS_PER_BIN * longest as f64 * code_period_s());
     let steps = (range_hz / step_hz).ceil() as i64;
@@ -168,11 +194,7 @@ fn best_fit(sums: &[Complex64], range_hz: f64) -> BitFit {
         power(best.offset_hz + step_hz),
     );
     let offset_hz = best.offset_hz + shift * step_hz;
-    BitFit {
-        offset_hz,
-        edge: best.edge,
-        power: power(offset_hz),
-    }
+    BitFit { offset_hz, ..best }
 }
 
 fn best_edge(sums: &[Complex64], offset_hz: f64) -> BitFit {
@@ -216,12 +238,23 @@ fn bit_ends(periods: usize, edge: usize) -> impl Iterator<Item = usize> {
     (first..periods).step_by(bit).chain([periods])
 }
 
-fn edge_power(running: &[Complex64], edge: usize) -> f64 {
+/// Sums of each data bit.
+fn bit_sums(running: &[Complex64], edge: usize) -> impl Iterator<Item = Complex64> {
     let mut start = 0;
-    let mut power = 0.0;
-    for end in bit_ends(running.len() - 1, edge) {
-        power += (running[end] - running[start]).norm_sqr();
+    bit_ends(running.len() - 1, edge).map(move |end| {
+        let sum = running[end] - running[start];
         start = end;
+        sum
+    })
+}
+
+/// Power of the bits and of each with the next, at the relative sign that gives more.
+fn edge_power(running: &[Complex64], edge: usize) -> f64 {
+    let mut last = Complex64::default();
+    let mut power = 0.0;
+    for bit in bit_sums(running, edge) {
+        power += bit.norm_sqr() + 2.0 * (bit * last.conj()).re.abs();
+        last = bit;
     }
     power
 }
@@ -263,11 +296,13 @@ fn fit_delay(
 /// Signal over noise power in one period: a sum over L periods has signal power L^2 and noise
 /// power L in units of those of one.
 fn period_snr(sums: &[Complex64], fit: BitFit, noise_power: f64) -> f64 {
+    let running = running_sums(sums, fit.offset_hz);
+    let power: f64 = bit_sums(&running, fit.edge).map(|bit| bit.norm_sqr()).sum();
     let mut start = 0;
     let mut square_lengths = 0.0;
     for end in bit_ends(sums.len(), fit.edge) {
         square_lengths += ((end - start) as f64).powi(2);
         start = end;
     }
-    (fit.power / noise_power - sums.len() as f64) / square_lengths
+    (power / noise_power - sums.len() as f64) / square_lengths
 }

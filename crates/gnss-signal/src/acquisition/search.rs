@@ -1,11 +1,21 @@
 //! Parallel code phase search of one code: coarse grid, then the best cells on a finer one.
+//!
+//! What stands out of a Doppler bin need not be the satellite: the codes of stronger ones, and
+//! interference that repeats with the code period (tones, a comb from a digital bus), leave a
+//! pattern over the code phases that stays the same from block to block. Such clutter shows in the
+//! mean of the bin over all code phases: by the excess over the other bins. Its peaks are
+//! distributed at worst as powers of complex noise of that mean, so a cell has to exceed the
+//! threshold by what a single such power can reach. (The cross-correlation of two C/A codes is
+//! milder: its largest power, at -21.6 dB, is 7 times its mean.)
 
 use std::sync::Arc;
 
 use num_complex::Complex32;
 use rustfft::{Fft, FftPlanner};
 
+use super::kernels;
 use super::spectra::Spectra;
+use super::threshold::Thresholds;
 use super::{ACQUISITION_RATE_HZ, FINE_POINTS, POINTS};
 use crate::Signal;
 
@@ -15,8 +25,8 @@ const CANDIDATES: usize = 3;
 /// threshold does: the coarse grid loses at most 2.1 dB against the fine one (a quarter chip
 /// 1.2 dB, a quarter bin 0.9 dB), the rest is for noise.
 const PROMISING_PART: f64 = 0.5;
-/// Points either side of a peak left out of the noise mean: two chips.
-const PEAK_POINTS: usize = 4;
+/// Chips either side of a peak left out of the noise mean.
+const PEAK_CHIPS: usize = 2;
 
 /// A cell of the search grid.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -25,7 +35,7 @@ pub(super) struct Cell {
     pub(super) quarter: i64,
     /// Delay of the code's start after the first sample, acquisition samples.
     pub(super) delay_samples: f64,
-    /// Power over the mean under noise.
+    /// Power over the mean under noise, less what clutter may add.
     pub(super) statistic: f64,
 }
 
@@ -76,7 +86,7 @@ impl Searcher {
         &mut self,
         spectra: &Spectra,
         code: &[Complex32],
-        threshold: f64,
+        thresholds: Thresholds,
     ) -> CodeSearch {
         let half_bins = spectra.grid().half_bins;
         let bins: Vec<BinSummary> = (-half_bins..=half_bins)
@@ -86,12 +96,12 @@ impl Searcher {
             })
             .collect();
         let noise = median(bins.iter().map(|bin| bin.mean).collect());
-        let promising = 1.0 + PROMISING_PART * (threshold - 1.0);
+        let promising = 1.0 + PROMISING_PART * (thresholds.sum - 1.0);
         let mut cells: Vec<Cell> = separate_peaks(bins)
             .into_iter()
             .enumerate()
-            .filter(|(rank, bin)| *rank == 0 || bin.power >= promising * noise.max(bin.mean))
-            .map(|(_, bin)| self.resolve(spectra, code, &bin, noise))
+            .filter(|(rank, bin)| *rank == 0 || bin.power >= promising * noise)
+            .map(|(_, bin)| self.resolve(spectra, code, &bin, noise, thresholds))
             .collect();
         cells.sort_by(|a, b| b.statistic.total_cmp(&a.statistic));
         CodeSearch {
@@ -107,6 +117,7 @@ impl Searcher {
         code: &[Complex32],
         peak: &BinSummary,
         noise: f64,
+        thresholds: Thresholds,
     ) -> Cell {
         let limit = 2 * spectra.grid().half_bins;
         let mut best = Cell {
@@ -114,14 +125,14 @@ impl Searcher {
             delay_samples: peak.point as f64,
             statistic: 0.0,
         };
-        // An interferer in this bin alone raises its mean; the noise of the others says nothing.
-        let noise = noise.max(peak.mean);
         let quarters = 2 * peak.bin - 1..=2 * peak.bin + 1;
         for quarter in quarters.filter(|quarter| quarter.abs() <= limit) {
             self.sum_powers(spectra, code, quarter, FINE_POINTS);
+            let mean = summarise(quarter, &self.power).mean;
+            let clutter = thresholds.single * (mean / noise - 1.0).max(0.0);
             for offset in 0..5 {
                 let point = (2 * peak.point + FINE_POINTS + offset - 2) % FINE_POINTS;
-                let statistic = f64::from(self.power[point]) / noise;
+                let statistic = f64::from(self.power[point]) / noise - clutter;
                 if statistic > best.statistic {
                     let samples_per_point = POINTS as f64 / FINE_POINTS as f64;
                     best = Cell {
@@ -157,8 +168,8 @@ impl Searcher {
             let middle_s = (index as f64 + 0.5) * grid.block_s();
             let slip = (slip_per_s * middle_s).round() as i64;
             let slip = (-slip).rem_euclid(points as i64) as usize;
-            add_powers(&product[slip..], &mut power[..points - slip]);
-            add_powers(&product[..slip], &mut power[points - slip..]);
+            kernels::add_powers(&product[slip..], &mut power[..points - slip]);
+            kernels::add_powers(&product[..slip], &mut power[points - slip..]);
         }
     }
 }
@@ -190,20 +201,8 @@ fn multiply_from(block: &[Complex32], first: usize, code: &[Complex32], product:
     let until_wrap = (block.len() - first).min(code.len());
     let (code_before, code_after) = code.split_at(until_wrap);
     let (before, after) = product.split_at_mut(until_wrap);
-    multiply_each(&block[first..], code_before, before);
-    multiply_each(block, code_after, after);
-}
-
-fn multiply_each(block: &[Complex32], code: &[Complex32], product: &mut [Complex32]) {
-    for ((product, block), code) in product.iter_mut().zip(block).zip(code) {
-        *product = block * code;
-    }
-}
-
-fn add_powers(values: &[Complex32], power: &mut [f32]) {
-    for (power, value) in power.iter_mut().zip(values) {
-        *power += value.norm_sqr();
-    }
+    kernels::multiply(&block[first..], code_before, before);
+    kernels::multiply(block, code_after, after);
 }
 
 /// Peak of a coarse bin and the mean of what is not within two chips of it.
@@ -222,14 +221,15 @@ fn summarise(bin: i64, power: &[f32]) -> BinSummary {
         }
     }
     let total: f64 = lanes.iter().map(|lane| f64::from(*lane)).sum();
-    let near: f64 = (0..=2 * PEAK_POINTS)
-        .map(|k| f64::from(power[(point + power.len() + k - PEAK_POINTS) % power.len()]))
+    let reach = PEAK_CHIPS * power.len() / 1023;
+    let near: f64 = (0..=2 * reach)
+        .map(|k| f64::from(power[(point + power.len() + k - reach) % power.len()]))
         .sum();
     BinSummary {
         bin,
         point,
         power: f64::from(peak),
-        mean: (total - near) / (power.len() - 2 * PEAK_POINTS - 1) as f64,
+        mean: (total - near) / (power.len() - 2 * reach - 1) as f64,
     }
 }
 

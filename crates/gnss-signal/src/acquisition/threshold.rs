@@ -4,13 +4,34 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::SignalError;
 
+/// Thresholds of one search.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Thresholds {
+    /// Of the non-coherent sum.
+    pub(super) sum: f64,
+    /// Of a single power.
+    pub(super) single: f64,
+}
+
+/// Thresholds of non-coherent sums and of a single one; see [`threshold`].
+pub(super) fn thresholds(
+    sums: u32,
+    cells: f64,
+    false_alarm_probability: f64,
+) -> Result<Thresholds, SignalError> {
+    Ok(Thresholds {
+        sum: threshold(sums, cells, false_alarm_probability)?,
+        single: threshold(1, cells, false_alarm_probability)?,
+    })
+}
+
 /// Threshold of a non-coherent sum of `sums` powers, divided by its mean under noise, which one of
 /// `cells` cells of white noise exceeds with at most `false_alarm_probability`.
 ///
 /// The sum is chi-square with 2 `sums` degrees of freedom. Neighbouring cells of the fine grid are
 /// correlated; counting each as independent keeps the promise from the safe side and costs about
 /// 0.1 dB.
-pub(super) fn threshold(
+fn threshold(
     sums: u32,
     cells: f64,
     false_alarm_probability: f64,
