@@ -86,39 +86,40 @@ impl CarrierLoop {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CodeLoop {
     age_s: f64,
-    bandwidth_hz: f64,
+    noise_per_s: f64,
 }
 
 impl CodeLoop {
-    /// A loop that has averaged for `age_s` so far.
+    /// A loop whose code phase is the mean of `age_s` so far.
     #[must_use]
     pub const fn new(age_s: f64) -> Self {
         Self {
             age_s,
-            bandwidth_hz: 0.0,
+            noise_per_s: 1.0 / age_s,
         }
     }
 
     /// Takes the code error of an interval and returns the correction of the code phase, chips.
     pub fn update(&mut self, error_chips: f64, final_bandwidth_hz: f64, interval_s: f64) -> f64 {
         self.age_s += interval_s;
-        // First-order loop: gain = 4 * bandwidth * interval; a mean over an age has
-        // bandwidth 1 / (4 * age).
-        self.bandwidth_hz = final_bandwidth_hz
-            .max(0.25 / self.age_s)
-            .min(0.25 / interval_s);
-        4.0 * self.bandwidth_hz * interval_s * error_chips
+        // First-order loop: gain = 4 * bandwidth * interval.
+        let gain = (4.0 * final_bandwidth_hz * interval_s)
+            .max(interval_s / self.age_s)
+            .min(1.0);
+        self.noise_per_s = (1.0 - gain).powi(2) * self.noise_per_s + gain * gain / interval_s;
+        gain * error_chips
     }
 
-    /// Starts to average anew.
+    /// Starts to average anew, from a mean of `age_s`.
     pub const fn widen(&mut self, age_s: f64) {
-        self.age_s = age_s;
+        *self = Self::new(age_s);
     }
 
-    /// Noise bandwidth in force, Hz.
+    /// Variance of the code phase over the variance of the code error times its interval, 1/s:
+    /// 2 * bandwidth once the loop is settled.
     #[must_use]
-    pub const fn bandwidth_hz(&self) -> f64 {
-        self.bandwidth_hz
+    pub const fn noise_per_s(&self) -> f64 {
+        self.noise_per_s
     }
 }
 
@@ -185,17 +186,19 @@ mod tests {
 
     #[test]
     fn code_loop_is_a_mean_until_its_final_bandwidth() {
-        let mut filter = CodeLoop::new(0.0);
+        let mut filter = CodeLoop::new(1e-12);
         let mut phase = 0.0;
         let offsets = [0.1, 0.3, -0.2, 0.4];
         for offset in offsets {
             phase += filter.update(offset - phase, 0.05, 0.01);
         }
-        // The running mean, exactly up to rounding.
-        assert_abs_diff_eq!(phase, 0.15, epsilon = 1e-12);
+        // The running mean, and a quarter of the variance; the age begins at a picosecond.
+        assert_abs_diff_eq!(phase, 0.15, epsilon = 1e-9);
+        assert_abs_diff_eq!(filter.noise_per_s(), 0.25 / 0.01, epsilon = 1e-6);
         for _ in 0..100_000 {
             filter.update(0.0, 0.05, 0.01);
         }
-        assert_abs_diff_eq!(filter.bandwidth_hz(), 0.05);
+        // Twice the bandwidth, to first order in the gain of 0.002.
+        assert_abs_diff_eq!(filter.noise_per_s(), 0.1, epsilon = 2e-4);
     }
 }

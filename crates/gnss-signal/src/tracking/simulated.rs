@@ -91,17 +91,36 @@ impl IdealSignal {
         let present = replica.signal == self.signal && middle < self.ends_s;
         let snr = if present { cn0::ratio_hz(self.cn0_dbhz) * length } else { 0.0 };
         let peak = snr.sqrt() * sinc * self.bit_at(middle);
-        let sums: Vec<Complex64> = replica
-            .tap_offsets
-            .as_slice()
+        let offsets = replica.tap_offsets.as_slice();
+        let noise = self.noise(offsets);
+        let sums: Vec<Complex64> = offsets
             .iter()
-            .map(|offset| {
+            .zip(noise)
+            .map(|(offset, noise)| {
                 let r = (1.0 - (error + offset).abs()).max(0.0);
-                let noise = Complex64::new(self.gauss(), self.gauss()) / 2f64.sqrt();
                 (Complex64::from_polar(peak * r, phase) + noise) * samples.sqrt()
             })
             .collect();
         Taps::new(&sums, samples as u32, 1.0)
+    }
+
+    /// Noise of unit variance whose taps correlate as the triangle does: the increments of a
+    /// random walk over one chip.
+    fn noise(&mut self, offsets: &[f64]) -> Vec<Complex64> {
+        let mut points: Vec<f64> = offsets.iter().flat_map(|o| [*o, o + 1.0]).collect();
+        points.sort_by(f64::total_cmp);
+        let (mut at, mut walk) = (points[0], Complex64::default());
+        let walks: Vec<Complex64> = points
+            .iter()
+            .map(|point| {
+                let step = Complex64::new(self.gauss(), self.gauss());
+                walk += step * ((point - at) / 2.0).sqrt();
+                at = *point;
+                walk
+            })
+            .collect();
+        let walk_at = |point: f64| walks[points.partition_point(|p| *p < point)];
+        offsets.iter().map(|o| walk_at(o + 1.0) - walk_at(*o)).collect()
     }
 
     fn gauss(&mut self) -> f64 {

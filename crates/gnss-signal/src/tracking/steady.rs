@@ -246,13 +246,14 @@ impl Steady {
         self.cn0_hz.max(lowest) * interval_s
     }
 
-    /// Variance of the code loop, early minus late power (Kaplan2017, 8.95), chips^2.
+    /// Variance of the code phase, chips^2: that of one early minus late (Kaplan2017, 8.95),
+    /// averaged by the loop.
     fn code_variance_chips2(&self) -> f64 {
         let spacing = self.settings.spacing_chips;
         let snr = self.snr(self.interval_s());
         let cn0_hz = snr / self.interval_s();
         let squaring = 1.0 + 2.0 / ((2.0 - spacing) * snr);
-        self.code.bandwidth_hz() * spacing / (2.0 * cn0_hz) * squaring
+        self.code.noise_per_s() * spacing / (4.0 * cn0_hz) * squaring
     }
 }
 
