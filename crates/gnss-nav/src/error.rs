@@ -47,4 +47,10 @@ pub enum NavError {
         /// Iterations made.
         iterations: usize,
     },
+    /// No millisecond ambiguities near the prior make the measurements agree.
+    #[error("{satellites} code phases agree with no position and time near the prior")]
+    NoFit {
+        /// Satellites measured.
+        satellites: usize,
+    },
 }

@@ -6,6 +6,7 @@ pub mod ephemeris;
 mod error;
 pub mod atmosphere;
 mod chi_square;
+pub mod coarse_time;
 pub mod constants;
 pub mod geodesy;
 pub mod least_squares;

@@ -57,11 +57,6 @@ impl RateEquation {
         self.is_usable()
             .then(|| self.row.residual - self.row.gradient.dot(&x))
     }
-
-    /// Standard deviation of the range rate, m/s.
-    pub(crate) fn sigma_mps(&self) -> f64 {
-        self.row.sigma
-    }
 }
 
 /// Velocity and drift from the usable ones of `equations`.
