@@ -4,6 +4,7 @@
 mod acquisition;
 mod bank;
 mod ca_code;
+mod correlator;
 mod error;
 pub mod sample;
 mod signal;
@@ -15,5 +16,6 @@ pub use bank::{
     Taps,
 };
 pub use ca_code::{CA_CODE_LENGTH_CHIPS, ranging_code};
+pub use correlator::{Correlator, IfCorrelatorBank, InstructionSet};
 pub use error::SignalError;
 pub use signal::{FrontEnd, Signal, SignalId, SignalSpec};

@@ -1,0 +1,356 @@
+//! The inner loops with AVX2, 32 samples at a time.
+#![allow(unsafe_code)]
+
+use std::arch::x86_64::*;
+
+use num_complex::Complex64;
+
+use super::{
+    InstructionSet,
+    carrier_table::{CarrierTable, TableAmplitude},
+    code_bits::CodeBits,
+    fixed_point::{Baseband, CODE_PERIOD, Interval, Kernel},
+    lane_table::{LaneTable, LaneTables},
+};
+use crate::{MAX_TAPS, SignalError};
+
+/// Samples of one vector of bytes.
+const LANES: usize = 32;
+
+/// Below this half a vector may span more chips than one table look-up reaches.
+pub(super) const LOWEST_SAMPLE_RATE_HZ: f64 = 1.8e6;
+
+/// In-phase and quadrature sums by lane.
+type Sums = [__m256; 2];
+
+/// Fixed-point kernel for AVX2.
+#[derive(Debug)]
+pub(super) struct Avx2 {
+    lanes: LaneTables<LANES>,
+    baseband: Baseband,
+    phases: [u64; MAX_TAPS],
+    sums: [Sums; MAX_TAPS],
+    baseband_sums: Sums,
+}
+
+pub(super) fn is_supported() -> bool {
+    is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma")
+}
+
+impl Avx2 {
+    /// The kernel, which exists only where the processor can run it.
+    pub(super) fn new() -> Result<Self, SignalError> {
+        if !is_supported() {
+            return Err(InstructionSet::Avx2.unsupported());
+        }
+        // `vpacksswb` takes eight samples of the first half, then eight of the second, in turn.
+        let order = std::array::from_fn(|byte| {
+            let (quarter, half, sample) = (byte / 16, byte / 8 % 2, byte % 8);
+            (16 * half + 8 * quarter + sample) as u8
+        });
+        // `vpshufb` looks up within 16 bytes: each half of a vector has its own window.
+        let origin = std::array::from_fn(|byte| (8 * (byte / 16)) as u8);
+        // SAFETY: all bits zero are floats, and the instruction set is there.
+        let zero = unsafe { [_mm256_setzero_ps(); 2] };
+        Ok(Self {
+            lanes: LaneTables::new(order, origin),
+            baseband: Baseband::zeroed(),
+            phases: [0; MAX_TAPS],
+            sums: [zero; MAX_TAPS],
+            baseband_sums: zero,
+        })
+    }
+}
+
+impl Kernel for Avx2 {
+    fn start(&mut self, interval: &Interval<'_>) {
+        self.lanes.select(interval.code_step_chips);
+        self.phases = interval.phases;
+        // SAFETY: an `Avx2` exists only where its instruction set does (`new`).
+        unsafe { clear(self) };
+    }
+
+    fn fill(
+        &self,
+        table: &mut CarrierTable,
+        len: usize,
+        step: f64,
+        amplitude: TableAmplitude,
+    ) -> Complex64 {
+        // SAFETY: an `Avx2` exists only where its instruction set does (`new`).
+        unsafe { fill(table, len, step, amplitude) }
+    }
+
+    fn add(
+        &mut self,
+        interval: &Interval<'_>,
+        samples: &[i8],
+        carrier: &CarrierTable,
+        turn: Complex64,
+    ) {
+        // SAFETY: an `Avx2` exists only where its instruction set does (`new`).
+        unsafe { add(self, interval, samples, carrier, turn) }
+    }
+
+    fn sums(&self, sums: &mut [Complex64]) -> Complex64 {
+        // SAFETY: an `Avx2` exists only where its instruction set does (`new`).
+        unsafe {
+            for (sum, lanes) in sums.iter_mut().zip(&self.sums) {
+                *sum = total(lanes);
+            }
+            total(&self.baseband_sums)
+        }
+    }
+}
+
+#[target_feature(enable = "avx2,fma")]
+fn clear(kernel: &mut Avx2) {
+    let zero = [_mm256_setzero_ps(); 2];
+    kernel.sums = [zero; MAX_TAPS];
+    kernel.baseband_sums = zero;
+}
+
+#[target_feature(enable = "avx2,fma")]
+fn fill(table: &mut CarrierTable, len: usize, step: f64, amplitude: TableAmplitude) -> Complex64 {
+    table.fill(len, step, amplitude)
+}
+
+#[target_feature(enable = "avx2,fma")]
+fn total(lanes: &Sums) -> Complex64 {
+    let [re, im] = lanes.map(|lanes| {
+        let half = _mm_add_ps(
+            _mm256_castps256_ps128(lanes),
+            _mm256_extractf128_ps::<1>(lanes),
+        );
+        let quarter = _mm_add_ps(half, _mm_movehl_ps(half, half));
+        let pair = _mm_add_ss(quarter, _mm_movehdup_ps(quarter));
+        f64::from(_mm_cvtss_f32(pair))
+    });
+    Complex64::new(re, im)
+}
+
+#[target_feature(enable = "avx2,fma")]
+fn add(
+    kernel: &mut Avx2,
+    interval: &Interval<'_>,
+    samples: &[i8],
+    carrier: &CarrierTable,
+    turn: Complex64,
+) {
+    let Avx2 {
+        lanes,
+        baseband,
+        phases,
+        sums,
+        baseband_sums,
+    } = kernel;
+    let totals = if interval.complex {
+        wipe_off_complex(samples, interval.shift, carrier, baseband)
+    } else {
+        wipe_off_real(samples, interval.shift, carrier, baseband)
+    };
+    add_turned(baseband_sums, totals, turn);
+    let Some(lanes) = lanes.current() else {
+        return;
+    };
+    let chunk = Chunk {
+        baseband,
+        blocks: samples.len() / interval.components() / LANES,
+        code: interval.code,
+        lanes,
+        step: interval.code_step(LANES),
+        turn,
+    };
+    let taps = interval.taps;
+    let (phases, rest_phases) = phases[..taps].as_chunks_mut();
+    let (sums, rest_sums) = sums[..taps].as_chunks_mut();
+    for (phases, sums) in phases.iter_mut().zip(sums) {
+        add_taps::<4>(&chunk, phases, sums);
+    }
+    match (rest_phases, rest_sums) {
+        ([a, b, c], [x, y, z]) => {
+            let (mut phases, mut sums) = ([*a, *b, *c], [*x, *y, *z]);
+            add_taps::<3>(&chunk, &mut phases, &mut sums);
+            [*a, *b, *c] = phases;
+            [*x, *y, *z] = sums;
+        }
+        (phases, sums) => {
+            for (phase, sum) in phases.iter_mut().zip(sums) {
+                add_taps::<1>(
+                    &chunk,
+                    std::array::from_mut(phase),
+                    std::array::from_mut(sum),
+                );
+            }
+        }
+    }
+}
+
+/// What the taps of one chunk share.
+struct Chunk<'a> {
+    baseband: &'a Baseband,
+    blocks: usize,
+    code: &'a CodeBits,
+    lanes: &'a LaneTable<LANES>,
+    step: u64,
+    turn: Complex64,
+}
+
+#[target_feature(enable = "avx2,fma")]
+fn add_taps<const TAPS: usize>(
+    chunk: &Chunk<'_>,
+    phases: &mut [u64; TAPS],
+    sums: &mut [Sums; TAPS],
+) {
+    let mut in_phase = [_mm256_setzero_si256(); TAPS];
+    let mut quadrature = [_mm256_setzero_si256(); TAPS];
+    let mut now = *phases;
+    let second_window = chunk.lanes.origin_chips(LANES / 2) & 31;
+    let (i_blocks, _) = chunk.baseband.i.as_chunks::<LANES>();
+    let (q_blocks, _) = chunk.baseband.q.as_chunks::<LANES>();
+    for (i, q) in i_blocks.iter().zip(q_blocks).take(chunk.blocks) {
+        let (i, q) = (load(i), load(q));
+        for tap in 0..TAPS {
+            let phase = now[tap];
+            let chip = (phase >> 32) as usize & 1023;
+            let windows = windows(chunk.code, chip, chip + second_window);
+            let code = _mm256_shuffle_epi8(windows, load(chunk.lanes.row(phase as u32)));
+            in_phase[tap] = _mm256_add_epi16(in_phase[tap], _mm256_maddubs_epi16(code, i));
+            quadrature[tap] = _mm256_add_epi16(quadrature[tap], _mm256_maddubs_epi16(code, q));
+            let next = phase + chunk.step;
+            now[tap] = next.min(next.wrapping_sub(CODE_PERIOD));
+        }
+    }
+    *phases = now;
+    for tap in 0..TAPS {
+        add_turned(&mut sums[tap], [in_phase[tap], quadrature[tap]], chunk.turn);
+    }
+}
+
+/// 16 chips of the code from `first` on and 16 from `second` on (each at most 1023 + 31).
+#[inline]
+#[target_feature(enable = "avx2,fma")]
+fn windows(code: &CodeBits, first: usize, second: usize) -> __m256i {
+    const { assert!(size_of::<CodeBits>() >= 1023 + 31 + 16) };
+    // SAFETY: both windows lie within `CodeBits`, and the loads ask for no alignment.
+    unsafe {
+        let first = _mm_loadu_si128(code.as_ptr().add(first).cast());
+        let second = _mm_loadu_si128(code.as_ptr().add(second).cast());
+        _mm256_set_m128i(second, first)
+    }
+}
+
+#[inline]
+#[target_feature(enable = "avx2,fma")]
+fn load<T: Copy, const N: usize>(values: &[T; N]) -> __m256i {
+    const { assert!(size_of::<T>() * N == 32) };
+    // SAFETY: the array is 32 bytes long, and the load asks for no alignment.
+    unsafe { _mm256_loadu_si256(values.as_ptr().cast()) }
+}
+
+#[inline]
+#[target_feature(enable = "avx2,fma")]
+fn store(values: &mut [i8; LANES], vector: __m256i) {
+    // SAFETY: the array is 32 bytes long, and the store asks for no alignment.
+    unsafe { _mm256_storeu_si256(values.as_mut_ptr().cast(), vector) }
+}
+
+/// Adds the 16-bit sums of a chunk (at most 32 vectors of two products below 128 each), turned by the carrier phase at its start.
+#[inline]
+#[target_feature(enable = "avx2,fma")]
+fn add_turned(sums: &mut Sums, chunk: [__m256i; 2], turn: Complex64) {
+    let ones = _mm256_set1_epi16(1);
+    let [i, q] = chunk.map(|sum| _mm256_cvtepi32_ps(_mm256_madd_epi16(sum, ones)));
+    let re = _mm256_set1_ps(turn.re as f32);
+    let im = _mm256_set1_ps(turn.im as f32);
+    sums[0] = _mm256_fnmadd_ps(q, im, _mm256_fmadd_ps(i, re, sums[0]));
+    sums[1] = _mm256_fmadd_ps(q, re, _mm256_fmadd_ps(i, im, sums[1]));
+}
+
+/// Wipes the carrier off real samples and returns the sums of the baseband.
+#[target_feature(enable = "avx2,fma")]
+fn wipe_off_real(
+    samples: &[i8],
+    shift: i32,
+    carrier: &CarrierTable,
+    out: &mut Baseband,
+) -> [__m256i; 2] {
+    let shift = _mm_cvtsi32_si128(shift);
+    let mut totals = [_mm256_setzero_si256(); 2];
+    let (samples, _) = samples.as_chunks::<LANES>();
+    let (re, _) = carrier.re.as_chunks::<{ LANES / 2 }>();
+    let (im, _) = carrier.im.as_chunks::<{ LANES / 2 }>();
+    let (out_i, _) = out.i.as_chunks_mut::<LANES>();
+    let (out_q, _) = out.q.as_chunks_mut::<LANES>();
+    let table = re.as_chunks::<2>().0.iter().zip(im.as_chunks::<2>().0);
+    let out = out_i.iter_mut().zip(out_q);
+    for ((x, (re, im)), (i, q)) in samples.iter().zip(table).zip(out) {
+        let x = load(x);
+        let first = _mm256_cvtepi8_epi16(_mm256_castsi256_si128(x));
+        let second = _mm256_cvtepi8_epi16(_mm256_extracti128_si256::<1>(x));
+        let first = _mm256_sll_epi16(first, shift);
+        let second = _mm256_sll_epi16(second, shift);
+        let baseband_i = _mm256_packs_epi16(
+            _mm256_mulhrs_epi16(first, load(&re[0])),
+            _mm256_mulhrs_epi16(second, load(&re[1])),
+        );
+        let baseband_q = _mm256_packs_epi16(
+            _mm256_mulhrs_epi16(first, load(&im[0])),
+            _mm256_mulhrs_epi16(second, load(&im[1])),
+        );
+        store(i, baseband_i);
+        store(q, baseband_q);
+        add_total(&mut totals, baseband_i, baseband_q);
+    }
+    totals
+}
+
+/// Wipes the carrier off complex samples and returns the sums of the baseband.
+#[target_feature(enable = "avx2,fma")]
+fn wipe_off_complex(
+    samples: &[i8],
+    shift: i32,
+    carrier: &CarrierTable,
+    out: &mut Baseband,
+) -> [__m256i; 2] {
+    // Components are moved to the top of a 16-bit lane, then down to their shifted place.
+    let down = _mm_cvtsi32_si128(8 - shift);
+    let mut totals = [_mm256_setzero_si256(); 2];
+    let (halves, _) = samples.as_chunks::<LANES>();
+    let (samples, _) = halves.as_chunks::<2>();
+    let (re, _) = carrier.re.as_chunks::<{ LANES / 2 }>();
+    let (im, _) = carrier.im.as_chunks::<{ LANES / 2 }>();
+    let (out_i, _) = out.i.as_chunks_mut::<LANES>();
+    let (out_q, _) = out.q.as_chunks_mut::<LANES>();
+    let table = re.as_chunks::<2>().0.iter().zip(im.as_chunks::<2>().0);
+    let out = out_i.iter_mut().zip(out_q);
+    for ((x, (re, im)), (i, q)) in samples.iter().zip(table).zip(out) {
+        let mut wide_i = [_mm256_setzero_si256(); 2];
+        let mut wide_q = [_mm256_setzero_si256(); 2];
+        for half in 0..2 {
+            let (re, im) = (load(&re[half]), load(&im[half]));
+            let x = load(&x[half]);
+            let x_i = _mm256_sra_epi16(_mm256_slli_epi16::<8>(x), down);
+            let x_q = _mm256_and_si256(x, _mm256_set1_epi16(-256));
+            let x_q = _mm256_sra_epi16(x_q, down);
+            wide_i[half] =
+                _mm256_sub_epi16(_mm256_mulhrs_epi16(x_i, re), _mm256_mulhrs_epi16(x_q, im));
+            wide_q[half] =
+                _mm256_add_epi16(_mm256_mulhrs_epi16(x_i, im), _mm256_mulhrs_epi16(x_q, re));
+        }
+        let baseband_i = _mm256_packs_epi16(wide_i[0], wide_i[1]);
+        let baseband_q = _mm256_packs_epi16(wide_q[0], wide_q[1]);
+        store(i, baseband_i);
+        store(q, baseband_q);
+        add_total(&mut totals, baseband_i, baseband_q);
+    }
+    totals
+}
+
+#[inline]
+#[target_feature(enable = "avx2,fma")]
+fn add_total(totals: &mut [__m256i; 2], i: __m256i, q: __m256i) {
+    let ones = _mm256_set1_epi8(1);
+    totals[0] = _mm256_add_epi16(totals[0], _mm256_maddubs_epi16(ones, i));
+    totals[1] = _mm256_add_epi16(totals[1], _mm256_maddubs_epi16(ones, q));
+}

@@ -1,0 +1,342 @@
+//! The inner loops with AVX-512 VBMI and VNNI, 64 samples at a time.
+#![allow(unsafe_code)]
+
+use std::arch::x86_64::*;
+
+use num_complex::Complex64;
+
+use super::{
+    InstructionSet,
+    carrier_table::{CarrierTable, TableAmplitude},
+    code_bits::CodeBits,
+    fixed_point::{Baseband, CODE_PERIOD, Interval, Kernel},
+    lane_table::{LaneTable, LaneTables},
+};
+use crate::{MAX_TAPS, SignalError};
+
+/// Samples of one vector of bytes.
+const LANES: usize = 64;
+
+/// Below this 64 samples may span more chips than one table look-up reaches.
+pub(super) const LOWEST_SAMPLE_RATE_HZ: f64 = 1.1e6;
+
+/// In-phase and quadrature sums by lane.
+type Sums = [__m512; 2];
+
+/// Fixed-point kernel for AVX-512.
+#[derive(Debug)]
+pub(super) struct Avx512 {
+    lanes: LaneTables<LANES>,
+    baseband: Baseband,
+    phases: [u64; MAX_TAPS],
+    sums: [Sums; MAX_TAPS],
+    baseband_sums: Sums,
+}
+
+pub(super) fn is_supported() -> bool {
+    is_x86_feature_detected!("avx512f")
+        && is_x86_feature_detected!("avx512bw")
+        && is_x86_feature_detected!("avx512vbmi")
+        && is_x86_feature_detected!("avx512vnni")
+        && is_x86_feature_detected!("fma")
+}
+
+impl Avx512 {
+    /// The kernel, which exists only where the processor can run it.
+    pub(super) fn new() -> Result<Self, SignalError> {
+        if !is_supported() {
+            return Err(InstructionSet::Avx512.unsupported());
+        }
+        // `vpacksswb` takes eight samples of the first half, then eight of the second, in turn.
+        let order = std::array::from_fn(|byte| {
+            let (quarter, half, sample) = (byte / 16, byte / 8 % 2, byte % 8);
+            (32 * half + 8 * quarter + sample) as u8
+        });
+        // SAFETY: all bits zero are floats, and the instruction set is there.
+        let zero = unsafe { [_mm512_setzero_ps(); 2] };
+        Ok(Self {
+            lanes: LaneTables::new(order, [0; LANES]),
+            baseband: Baseband::zeroed(),
+            phases: [0; MAX_TAPS],
+            sums: [zero; MAX_TAPS],
+            baseband_sums: zero,
+        })
+    }
+}
+
+impl Kernel for Avx512 {
+    fn start(&mut self, interval: &Interval<'_>) {
+        self.lanes.select(interval.code_step_chips);
+        self.phases = interval.phases;
+        // SAFETY: an `Avx512` exists only where its instruction set does (`new`).
+        unsafe { clear(self) };
+    }
+
+    fn fill(
+        &self,
+        table: &mut CarrierTable,
+        len: usize,
+        step: f64,
+        amplitude: TableAmplitude,
+    ) -> Complex64 {
+        // SAFETY: an `Avx512` exists only where its instruction set does (`new`).
+        unsafe { fill(table, len, step, amplitude) }
+    }
+
+    fn add(
+        &mut self,
+        interval: &Interval<'_>,
+        samples: &[i8],
+        carrier: &CarrierTable,
+        turn: Complex64,
+    ) {
+        // SAFETY: an `Avx512` exists only where its instruction set does (`new`).
+        unsafe { add(self, interval, samples, carrier, turn) }
+    }
+
+    fn sums(&self, sums: &mut [Complex64]) -> Complex64 {
+        // SAFETY: an `Avx512` exists only where its instruction set does (`new`).
+        unsafe {
+            for (sum, lanes) in sums.iter_mut().zip(&self.sums) {
+                *sum = total(lanes);
+            }
+            total(&self.baseband_sums)
+        }
+    }
+}
+
+#[target_feature(enable = "avx512f")]
+fn clear(kernel: &mut Avx512) {
+    let zero = [_mm512_setzero_ps(); 2];
+    kernel.sums = [zero; MAX_TAPS];
+    kernel.baseband_sums = zero;
+}
+
+#[target_feature(enable = "avx512f,avx512bw,fma")]
+fn fill(table: &mut CarrierTable, len: usize, step: f64, amplitude: TableAmplitude) -> Complex64 {
+    table.fill(len, step, amplitude)
+}
+
+#[target_feature(enable = "avx512f")]
+fn total(lanes: &Sums) -> Complex64 {
+    let [re, im] = lanes.map(|lanes| f64::from(_mm512_reduce_add_ps(lanes)));
+    Complex64::new(re, im)
+}
+
+#[target_feature(enable = "avx512f,avx512bw,avx512vbmi,avx512vnni,fma")]
+fn add(
+    kernel: &mut Avx512,
+    interval: &Interval<'_>,
+    samples: &[i8],
+    carrier: &CarrierTable,
+    turn: Complex64,
+) {
+    let Avx512 {
+        lanes,
+        baseband,
+        phases,
+        sums,
+        baseband_sums,
+    } = kernel;
+    let totals = if interval.complex {
+        wipe_off_complex(samples, interval.shift, carrier, baseband)
+    } else {
+        wipe_off_real(samples, interval.shift, carrier, baseband)
+    };
+    add_turned(baseband_sums, totals, turn);
+    let Some(lanes) = lanes.current() else {
+        return;
+    };
+    let chunk = Chunk {
+        baseband,
+        blocks: samples.len() / interval.components() / LANES,
+        code: interval.code,
+        lanes,
+        step: interval.code_step(LANES),
+        turn,
+    };
+    let taps = interval.taps;
+    let (phases, rest_phases) = phases[..taps].as_chunks_mut();
+    let (sums, rest_sums) = sums[..taps].as_chunks_mut();
+    for (phases, sums) in phases.iter_mut().zip(sums) {
+        add_taps::<4>(&chunk, phases, sums);
+    }
+    match (rest_phases, rest_sums) {
+        ([a, b, c], [x, y, z]) => {
+            let (mut phases, mut sums) = ([*a, *b, *c], [*x, *y, *z]);
+            add_taps::<3>(&chunk, &mut phases, &mut sums);
+            [*a, *b, *c] = phases;
+            [*x, *y, *z] = sums;
+        }
+        (phases, sums) => {
+            for (phase, sum) in phases.iter_mut().zip(sums) {
+                add_taps::<1>(
+                    &chunk,
+                    std::array::from_mut(phase),
+                    std::array::from_mut(sum),
+                );
+            }
+        }
+    }
+}
+
+/// What the taps of one chunk share.
+struct Chunk<'a> {
+    baseband: &'a Baseband,
+    blocks: usize,
+    code: &'a CodeBits,
+    lanes: &'a LaneTable<LANES>,
+    step: u64,
+    turn: Complex64,
+}
+
+#[target_feature(enable = "avx512f,avx512bw,avx512vbmi,avx512vnni,fma")]
+fn add_taps<const TAPS: usize>(
+    chunk: &Chunk<'_>,
+    phases: &mut [u64; TAPS],
+    sums: &mut [Sums; TAPS],
+) {
+    let mut in_phase = [_mm512_setzero_si512(); TAPS];
+    let mut quadrature = [_mm512_setzero_si512(); TAPS];
+    let mut now = *phases;
+    let (i_blocks, _) = chunk.baseband.i.as_chunks::<LANES>();
+    let (q_blocks, _) = chunk.baseband.q.as_chunks::<LANES>();
+    for (i, q) in i_blocks.iter().zip(q_blocks).take(chunk.blocks) {
+        let (i, q) = (load(i), load(q));
+        for tap in 0..TAPS {
+            let phase = now[tap];
+            let chip = (phase >> 32) as usize & 1023;
+            let window = load(window(chunk.code, chip));
+            let code = _mm512_permutexvar_epi8(load(chunk.lanes.row(phase as u32)), window);
+            in_phase[tap] = _mm512_dpbusd_epi32(in_phase[tap], code, i);
+            quadrature[tap] = _mm512_dpbusd_epi32(quadrature[tap], code, q);
+            let next = phase + chunk.step;
+            now[tap] = next.min(next.wrapping_sub(CODE_PERIOD));
+        }
+    }
+    *phases = now;
+    for tap in 0..TAPS {
+        add_turned(&mut sums[tap], [in_phase[tap], quadrature[tap]], chunk.turn);
+    }
+}
+
+/// The code from `chip` (at most 1023) on.
+#[inline(always)]
+fn window(code: &CodeBits, chip: usize) -> &[u8; LANES] {
+    // SAFETY: `CodeBits` holds 1024 chips and a window, and all bytes are aligned.
+    unsafe { &*code.as_ptr().add(chip).cast() }
+}
+
+#[inline]
+#[target_feature(enable = "avx512f")]
+fn load<T: Copy, const N: usize>(values: &[T; N]) -> __m512i {
+    const { assert!(size_of::<T>() * N == 64) };
+    // SAFETY: the array is 64 bytes long, and the load asks for no alignment.
+    unsafe { _mm512_loadu_si512(values.as_ptr().cast()) }
+}
+
+#[inline]
+#[target_feature(enable = "avx512f")]
+fn store(values: &mut [i8; LANES], vector: __m512i) {
+    // SAFETY: the array is 64 bytes long, and the store asks for no alignment.
+    unsafe { _mm512_storeu_si512(values.as_mut_ptr().cast(), vector) }
+}
+
+/// Adds the sums of a chunk, turned by the carrier phase at its start.
+#[inline]
+#[target_feature(enable = "avx512f,fma")]
+fn add_turned(sums: &mut Sums, chunk: [__m512i; 2], turn: Complex64) {
+    let [i, q] = chunk.map(|sum| _mm512_cvtepi32_ps(sum));
+    let re = _mm512_set1_ps(turn.re as f32);
+    let im = _mm512_set1_ps(turn.im as f32);
+    sums[0] = _mm512_fnmadd_ps(q, im, _mm512_fmadd_ps(i, re, sums[0]));
+    sums[1] = _mm512_fmadd_ps(q, re, _mm512_fmadd_ps(i, im, sums[1]));
+}
+
+/// Wipes the carrier off real samples and returns the sums of the baseband.
+#[target_feature(enable = "avx512f,avx512bw,avx512vnni")]
+fn wipe_off_real(
+    samples: &[i8],
+    shift: i32,
+    carrier: &CarrierTable,
+    out: &mut Baseband,
+) -> [__m512i; 2] {
+    let shift = _mm_cvtsi32_si128(shift);
+    let mut totals = [_mm512_setzero_si512(); 2];
+    let (samples, _) = samples.as_chunks::<LANES>();
+    let (re, _) = carrier.re.as_chunks::<{ LANES / 2 }>();
+    let (im, _) = carrier.im.as_chunks::<{ LANES / 2 }>();
+    let (out_i, _) = out.i.as_chunks_mut::<LANES>();
+    let (out_q, _) = out.q.as_chunks_mut::<LANES>();
+    let table = re.as_chunks::<2>().0.iter().zip(im.as_chunks::<2>().0);
+    let out = out_i.iter_mut().zip(out_q);
+    for ((x, (re, im)), (i, q)) in samples.iter().zip(table).zip(out) {
+        let x = load(x);
+        let first = _mm512_cvtepi8_epi16(_mm512_castsi512_si256(x));
+        let second = _mm512_cvtepi8_epi16(_mm512_extracti64x4_epi64::<1>(x));
+        let first = _mm512_sll_epi16(first, shift);
+        let second = _mm512_sll_epi16(second, shift);
+        let baseband_i = _mm512_packs_epi16(
+            _mm512_mulhrs_epi16(first, load(&re[0])),
+            _mm512_mulhrs_epi16(second, load(&re[1])),
+        );
+        let baseband_q = _mm512_packs_epi16(
+            _mm512_mulhrs_epi16(first, load(&im[0])),
+            _mm512_mulhrs_epi16(second, load(&im[1])),
+        );
+        store(i, baseband_i);
+        store(q, baseband_q);
+        add_total(&mut totals, baseband_i, baseband_q);
+    }
+    totals
+}
+
+/// Wipes the carrier off complex samples and returns the sums of the baseband.
+#[target_feature(enable = "avx512f,avx512bw,avx512vnni")]
+fn wipe_off_complex(
+    samples: &[i8],
+    shift: i32,
+    carrier: &CarrierTable,
+    out: &mut Baseband,
+) -> [__m512i; 2] {
+    // Components are moved to the top of a 16-bit lane, then down to their shifted place.
+    let down = _mm_cvtsi32_si128(8 - shift);
+    let mut totals = [_mm512_setzero_si512(); 2];
+    let (halves, _) = samples.as_chunks::<LANES>();
+    let (samples, _) = halves.as_chunks::<2>();
+    let (re, _) = carrier.re.as_chunks::<{ LANES / 2 }>();
+    let (im, _) = carrier.im.as_chunks::<{ LANES / 2 }>();
+    let (out_i, _) = out.i.as_chunks_mut::<LANES>();
+    let (out_q, _) = out.q.as_chunks_mut::<LANES>();
+    let table = re.as_chunks::<2>().0.iter().zip(im.as_chunks::<2>().0);
+    let out = out_i.iter_mut().zip(out_q);
+    for ((x, (re, im)), (i, q)) in samples.iter().zip(table).zip(out) {
+        let mut wide_i = [_mm512_setzero_si512(); 2];
+        let mut wide_q = [_mm512_setzero_si512(); 2];
+        for half in 0..2 {
+            let (re, im) = (load(&re[half]), load(&im[half]));
+            let x = load(&x[half]);
+            let x_i = _mm512_sra_epi16(_mm512_slli_epi16::<8>(x), down);
+            let x_q = _mm512_and_si512(x, _mm512_set1_epi16(-256));
+            let x_q = _mm512_sra_epi16(x_q, down);
+            wide_i[half] =
+                _mm512_sub_epi16(_mm512_mulhrs_epi16(x_i, re), _mm512_mulhrs_epi16(x_q, im));
+            wide_q[half] =
+                _mm512_add_epi16(_mm512_mulhrs_epi16(x_i, im), _mm512_mulhrs_epi16(x_q, re));
+        }
+        let baseband_i = _mm512_packs_epi16(wide_i[0], wide_i[1]);
+        let baseband_q = _mm512_packs_epi16(wide_q[0], wide_q[1]);
+        store(i, baseband_i);
+        store(q, baseband_q);
+        add_total(&mut totals, baseband_i, baseband_q);
+    }
+    totals
+}
+
+#[inline]
+#[target_feature(enable = "avx512f,avx512vnni")]
+fn add_total(totals: &mut [__m512i; 2], i: __m512i, q: __m512i) {
+    let ones = _mm512_set1_epi8(1);
+    totals[0] = _mm512_dpbusd_epi32(totals[0], ones, i);
+    totals[1] = _mm512_dpbusd_epi32(totals[1], ones, q);
+}

@@ -1,0 +1,28 @@
+//! Ranging codes as the kernels read them.
+
+use std::sync::LazyLock;
+
+use crate::{CA_CODE_LENGTH_CHIPS, Signal, SignalId, ranging_code};
+
+/// Most chips a vector kernel reads in one piece.
+pub(super) const WINDOW_CHIPS: usize = 64;
+
+/// A ranging code, 1 where the chip is +1 and 0 where it is -1, continued into the next period so
+/// that a window from any chip of the first is contiguous.
+pub(super) type CodeBits = [u8; CA_CODE_LENGTH_CHIPS + 1 + WINDOW_CHIPS];
+
+static CA_CODE_BITS: LazyLock<Vec<CodeBits>> = LazyLock::new(|| {
+    let spec = Signal::GpsL1Ca.spec();
+    (spec.first_prn..=spec.last_prn)
+        .filter_map(|prn| SignalId::new(Signal::GpsL1Ca, prn).ok())
+        .map(|signal| {
+            let code = ranging_code(signal);
+            std::array::from_fn(|chip| u8::from(code[chip % CA_CODE_LENGTH_CHIPS] > 0))
+        })
+        .collect()
+});
+
+/// The code of `signal`.
+pub(super) fn code_bits(signal: SignalId) -> &'static CodeBits {
+    &CA_CODE_BITS[usize::from(signal.prn() - signal.spec().first_prn)]
+}

@@ -1,0 +1,251 @@
+//! The fixed-point scheme shared by the portable and the vector kernels.
+//!
+//! An interval is cut into chunks. Of each chunk the carrier is wiped off once, into 8-bit
+//! baseband; then every tap adds up the baseband under its own replica of the code, whose phase is
+//! kept in 32.32 bits. The sums of a chunk are turned by the carrier phase at its start.
+
+use std::f64::consts::TAU;
+
+use num_complex::Complex64;
+
+use super::{
+    carrier_table::{CHUNK_SAMPLES, CarrierTable, TableAmplitude},
+    code_bits::{CodeBits, code_bits},
+};
+use crate::{CA_CODE_LENGTH_CHIPS, FrontEnd, MAX_TAPS, Replica, SignalError};
+
+/// Samples a chunk is a multiple of: the widest vector.
+pub(super) const BLOCK_SAMPLES: usize = 64;
+
+/// One chip in fixed point.
+const ONE_CHIP: f64 = 4_294_967_296.0;
+
+/// One code period in fixed point.
+pub(super) const CODE_PERIOD: u64 = (CA_CODE_LENGTH_CHIPS as u64) << 32;
+
+/// Baseband of one chunk.
+#[derive(Debug, Clone)]
+#[repr(C, align(64))]
+pub(super) struct Baseband {
+    pub(super) i: [i8; CHUNK_SAMPLES],
+    pub(super) q: [i8; CHUNK_SAMPLES],
+}
+
+impl Baseband {
+    pub(super) const fn zeroed() -> Self {
+        Self {
+            i: [0; CHUNK_SAMPLES],
+            q: [0; CHUNK_SAMPLES],
+        }
+    }
+}
+
+/// A replica and its samples in the units of the kernels.
+#[derive(Debug, Clone)]
+pub(super) struct Interval<'a> {
+    samples: &'a [i8],
+    pub(super) complex: bool,
+    pub(super) code: &'static CodeBits,
+    carrier_phase_cycles: f64,
+    carrier_step_cycles: f64,
+    /// Code step of a sample, chips.
+    pub(super) code_step_chips: f64,
+    /// Code phase of every tap at the first sample, 32.32 bits of chips, below [`CODE_PERIOD`].
+    pub(super) phases: [u64; MAX_TAPS],
+    pub(super) taps: usize,
+    /// Samples are multiplied by two to this power before they are rounded.
+    pub(super) shift: i32,
+    amplitude: TableAmplitude,
+}
+
+impl<'a> Interval<'a> {
+    pub(super) fn new(
+        front_end: FrontEnd,
+        samples: &'a [i8],
+        sample_power: f64,
+        replica: &Replica,
+    ) -> Result<Self, SignalError> {
+        check(front_end, samples, replica)?;
+        let offsets_chips = replica.tap_offsets.as_slice();
+        let mut phases = [0; MAX_TAPS];
+        for (phase, offset_chips) in phases.iter_mut().zip(offsets_chips) {
+            *phase = fixed_phase(replica.code_phase_chips - offset_chips);
+        }
+        let (shift, amplitude) = levels(sample_power, front_end.complex);
+        Ok(Self {
+            samples,
+            complex: front_end.complex,
+            code: code_bits(replica.signal),
+            carrier_phase_cycles: replica.carrier_phase_cycles,
+            carrier_step_cycles: replica.carrier_frequency_hz / front_end.sample_rate_hz,
+            code_step_chips: replica.code_rate_hz / front_end.sample_rate_hz,
+            phases,
+            taps: offsets_chips.len(),
+            shift,
+            amplitude,
+        })
+    }
+
+    /// 2 where complex, otherwise 1.
+    pub(super) const fn components(&self) -> usize {
+        if self.complex { 2 } else { 1 }
+    }
+
+    /// Samples in a chunk: fewer in short intervals, where the carrier table would cost most.
+    fn chunk_samples(&self) -> usize {
+        let count = self.samples.len() / self.components();
+        (count / 8)
+            .next_multiple_of(2 * BLOCK_SAMPLES)
+            .clamp(256, CHUNK_SAMPLES)
+    }
+
+    /// Code step of `samples` samples, 32.32 bits of chips.
+    pub(super) fn code_step(&self, samples: usize) -> u64 {
+        (self.code_step_chips * samples as f64 * ONE_CHIP).round() as u64
+    }
+}
+
+/// Shift of the samples and amplitudes of the carrier for samples of mean square `sample_power`.
+///
+/// The rms of noise then lies between an eighth and a quarter of the 8-bit range, where rounding
+/// costs little and clipping is rare; complex products reach sqrt(2) times further than real ones.
+/// The dither spans one unit of the baseband at that rms.
+fn levels(sample_power: f64, complex: bool) -> (i32, TableAmplitude) {
+    let (carrier, largest_rms, component) = if complex {
+        (22_938.0, 64.0, std::f64::consts::FRAC_1_SQRT_2)
+    } else {
+        (31_700.0, 32.0, 1.0)
+    };
+    let rms = sample_power.max(0.0).sqrt();
+    let shift = ((largest_rms / rms).log2().floor() as i32).clamp(0, 6);
+    let shifted_rms = (rms * f64::from(1 << shift)).max(largest_rms / 2.0);
+    let dither = (32_768.0 / (shifted_rms * component)) as f32;
+    (shift, TableAmplitude { carrier, dither })
+}
+
+/// `phase_chips` within the code period, 32.32 bits.
+fn fixed_phase(phase_chips: f64) -> u64 {
+    let wrapped = phase_chips.rem_euclid(CA_CODE_LENGTH_CHIPS as f64);
+    (wrapped * ONE_CHIP) as u64 % CODE_PERIOD
+}
+
+fn check(front_end: FrontEnd, samples: &[i8], replica: &Replica) -> Result<(), SignalError> {
+    let refuse = |name, value: f64, expected| {
+        Err(SignalError::Parameter {
+            name,
+            value: value.to_string(),
+            expected,
+        })
+    };
+    let components = if front_end.complex { 2 } else { 1 };
+    let ticks = replica.end_tick.saturating_sub(replica.start_tick);
+    if ticks.saturating_mul(components) != samples.len() as u64 || ticks > u64::from(u32::MAX) {
+        let expected = "as many as the replica's interval has";
+        return refuse("number of samples", samples.len() as f64, expected);
+    }
+    for (name, value) in [
+        ("code rate (chips/s)", replica.code_rate_hz),
+        ("code phase (chips)", replica.code_phase_chips),
+        ("carrier phase (cycles)", replica.carrier_phase_cycles),
+        ("carrier frequency (Hz)", replica.carrier_frequency_hz),
+    ] {
+        if !value.is_finite() {
+            return refuse(name, value, "a finite number");
+        }
+    }
+    let nominal_hz = replica.signal.spec().code_rate_hz;
+    if (replica.code_rate_hz / nominal_hz - 1.0).abs() > 0.05 {
+        let expected = "within 5 % of the nominal rate";
+        return refuse("code rate (chips/s)", replica.code_rate_hz, expected);
+    }
+    Ok(())
+}
+
+/// The inner loops of one instruction set.
+///
+/// Sums are kept over the chunks of an interval: those of the taps, in units of (code bits 0 and 1)
+/// times baseband, and that of the baseband alone.
+pub(super) trait Kernel {
+    /// Makes ready for `interval` and clears the sums.
+    fn start(&mut self, interval: &Interval<'_>);
+
+    /// Fills the carrier table (compiled for the instruction set).
+    fn fill(
+        &self,
+        table: &mut CarrierTable,
+        len: usize,
+        step: f64,
+        amplitude: TableAmplitude,
+    ) -> Complex64 {
+        table.fill(len, step, amplitude)
+    }
+
+    /// Adds one chunk, a multiple of [`BLOCK_SAMPLES`] long, its sums turned by `turn`.
+    fn add(
+        &mut self,
+        interval: &Interval<'_>,
+        samples: &[i8],
+        carrier: &CarrierTable,
+        turn: Complex64,
+    );
+
+    /// Sum of the baseband, and those of the taps into `sums`.
+    fn sums(&self, sums: &mut [Complex64]) -> Complex64;
+}
+
+/// Correlates intervals on one kernel.
+#[derive(Debug)]
+pub(super) struct FixedPoint<K> {
+    kernel: K,
+    carrier: CarrierTable,
+    /// The last chunk, filled up with zeros.
+    last: [i8; 2 * CHUNK_SAMPLES],
+}
+
+impl<K: Kernel> FixedPoint<K> {
+    pub(super) fn boxed(kernel: K) -> Box<Self> {
+        Box::new(Self {
+            kernel,
+            carrier: CarrierTable::new(),
+            last: [0; 2 * CHUNK_SAMPLES],
+        })
+    }
+
+    /// Sums of the taps, in units of the samples.
+    pub(super) fn correlate(&mut self, interval: &Interval<'_>, sums: &mut [Complex64]) {
+        let chunk_samples = interval.chunk_samples();
+        let step_cycles = interval.carrier_step_cycles;
+        let chunk_turn = self.kernel.fill(
+            &mut self.carrier,
+            chunk_samples,
+            step_cycles,
+            interval.amplitude,
+        );
+        let mut turn = Complex64::cis(-TAU * interval.carrier_phase_cycles.fract());
+        self.kernel.start(interval);
+        for chunk in interval
+            .samples
+            .chunks(chunk_samples * interval.components())
+        {
+            let whole = chunk
+                .len()
+                .next_multiple_of(BLOCK_SAMPLES * interval.components());
+            let chunk = if whole == chunk.len() {
+                chunk
+            } else {
+                self.last[..chunk.len()].copy_from_slice(chunk);
+                self.last[chunk.len()..whole].fill(0);
+                &self.last[..whole]
+            };
+            self.kernel.add(interval, chunk, &self.carrier, turn);
+            turn *= chunk_turn;
+        }
+        let baseband_sum = self.kernel.sums(sums);
+        let scale =
+            32_768.0 / (f64::from(interval.amplitude.carrier) * f64::from(1 << interval.shift));
+        for sum in sums {
+            // Code bits 0, 1 to chips -1, +1.
+            *sum = (*sum * 2.0 - baseband_sum) * scale;
+        }
+    }
+}
