@@ -2,136 +2,20 @@
 
 use super::assembly::Assembly;
 use super::bit_buffer::BitBuffer;
-use super::frame_sync::{self, Candidate, Polarity};
+use super::event::{LnavEvent, LossReason, NavBit};
+use super::frame_sync;
 use super::reading::Reading;
-use super::subframe::almanac::Almanac;
 use super::subframe::hand_over::HandOver;
-use super::subframe::health::{Configuration, HealthReference};
-use super::subframe::ionosphere_utc::IonosphereUtc;
 use super::subframe::page::Page;
-use super::{CODE_PERIODS_PER_BIT, SUBFRAME_BITS, SUBFRAMES_PER_WEEK};
-use crate::{Ephemeris, GpsTime, SatelliteId};
-
-/// A navigation bit as tracked.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct NavBit {
-    /// Amplitude; its sign is the bit up to the unknown polarity of the channel. Zero and NaN mark
-    /// an erased bit.
-    pub soft: f32,
-    /// Code period, counted from the start of the channel, with which the bit begins.
-    pub code_period: u64,
-}
-
-/// Why frame synchronisation was given up.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum LossReason {
-    /// Bit boundaries moved, code periods ran backwards, or more than 30 s are missing.
-    Discontinuity,
-    /// Words 1 and 2 passed parity and tell another time.
-    Contradiction,
-    /// No hand-over word passed for a minute.
-    Silence,
-}
-
-/// What the decoder found out.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[non_exhaustive]
-pub enum LnavEvent {
-    /// Transmit time is known: the signal of code period `start_code_period + n` left the
-    /// satellite at `tow_s + n * 1 ms`.
-    Sync {
-        /// Code period with which the subframe begins.
-        start_code_period: i64,
-        /// Time of week at the start of the subframe, s.
-        tow_s: u32,
-        /// Polarity of the channel.
-        polarity: Polarity,
-    },
-    /// A subframe ended; also those received before sync, oldest first.
-    Subframe {
-        /// Subframe 1 to 5.
-        id: u8,
-        /// Time of week at its start, s.
-        tow_s: u32,
-        /// Code period with which it begins; negative where that was before the channel.
-        start_code_period: i64,
-        /// Words that passed parity, word 1 in the least significant of ten bits.
-        words_valid: u16,
-        /// Polarity of its preamble, where word 1 passed.
-        polarity: Option<Polarity>,
-        /// Its hand-over word, where that passed.
-        hand_over: Option<HandOver>,
-    },
-    /// The week is known.
-    Week {
-        /// When the latest subframe 1 started, in GPS time of transmission.
-        sent: GpsTime,
-        /// Code period with which it begins.
-        start_code_period: i64,
-    },
-    /// A complete ephemeris, once for every new content.
-    Ephemeris(Ephemeris),
-    /// Page 18 of subframe 4.
-    IonosphereUtc(IonosphereUtc),
-    /// An almanac page.
-    Almanac(Almanac),
-    /// Page 25 of subframe 5.
-    HealthReference(HealthReference),
-    /// Page 25 of subframe 4.
-    Configuration(Configuration),
-    /// Transmit time is no longer known.
-    SyncLost {
-        /// Why.
-        reason: LossReason,
-    },
-}
+use super::timebase::Timebase;
+use super::{CODE_PERIODS_PER_BIT, SUBFRAME_BITS};
+use crate::SatelliteId;
 
 /// Erased bits up to which a gap is bridged: the rest of the buffer keeps a started subframe.
 const LONGEST_GAP_BITS: i64 = (BitBuffer::CAPACITY - SUBFRAME_BITS) as i64;
 
-/// Bits without a hand-over word after which the time is no longer trusted (one minute).
-const LONGEST_SILENCE_BITS: i64 = 10 * SUBFRAME_BITS as i64;
-
-/// Which bit was sent when.
-#[derive(Debug, Clone, Copy)]
-struct Timebase {
-    /// First bit of a subframe.
-    start: i64,
-    /// Subframes since the start of the week at that bit.
-    subframe_count: u32,
-    polarity: Polarity,
-    /// First bit of the next subframe to read.
-    next: i64,
-    /// First bit of the latest subframe whose hand-over word agreed.
-    confirmed: i64,
-}
-
-impl Timebase {
-    fn new(found: &Candidate, first_bit: i64) -> Self {
-        let length = SUBFRAME_BITS as i64;
-        let started_before = (found.start - first_bit + length - 1).div_euclid(length);
-        Self {
-            start: found.start,
-            subframe_count: found.hand_over.subframe_count,
-            polarity: found.polarity,
-            next: found.start - started_before * length,
-            confirmed: found.start,
-        }
-    }
-
-    /// The hand-over word, flags aside, of the subframe that starts at bit `start`.
-    fn hand_over_at(&self, start: i64) -> HandOver {
-        let ahead = (start - self.start).div_euclid(SUBFRAME_BITS as i64);
-        let count = i64::from(self.subframe_count) + ahead;
-        HandOver::at(count.rem_euclid(SUBFRAMES_PER_WEEK.into()) as u32)
-    }
-
-    fn agrees_with(&self, found: &Candidate) -> bool {
-        let offset = (found.start - self.start).rem_euclid(SUBFRAME_BITS as i64);
-        let expected = self.hand_over_at(found.start);
-        offset == 0 && expected.subframe_count == found.hand_over.subframe_count
-    }
-}
+/// Bit of the hand-over word in `words_valid`.
+const HAND_OVER_MASK: u16 = 1 << 1;
 
 /// LNAV decoder of one channel.
 ///
@@ -229,7 +113,7 @@ impl LnavDecoder {
         timebase.next += SUBFRAME_BITS as i64;
         let expected = timebase.hand_over_at(start);
         let reading = Reading::of(&self.bits, start, timebase.polarity);
-        match check_time(timebase, start, &reading) {
+        match timebase.check(start, &reading) {
             Ok(()) => self.report(start, expected, &reading, events),
             Err(reason) => {
                 self.lose(reason, events);
@@ -250,13 +134,21 @@ impl LnavDecoder {
             return;
         }
         let start_code_period = self.code_period(start);
+        let is_expected = |found: &HandOver| found.subframe_count == expected.subframe_count;
+        let hand_over = reading.hand_over().filter(is_expected);
+        // A hand-over word of another time passed by chance.
+        let refused = if hand_over.is_none() {
+            HAND_OVER_MASK
+        } else {
+            0
+        };
         events.push(LnavEvent::Subframe {
             id: expected.id,
             tow_s: expected.tow_s(),
             start_code_period,
-            words_valid: reading.passed(),
+            words_valid: reading.passed() & !refused,
             polarity: reading.polarity,
-            hand_over: reading.hand_over(),
+            hand_over,
         });
         if expected.id > 3 {
             events.extend(read_page(expected.id, reading));
@@ -288,24 +180,6 @@ impl LnavDecoder {
             .saturating_mul(CODE_PERIODS_PER_BIT as i64)
             .saturating_add(self.phase.unwrap_or(0) as i64)
     }
-}
-
-/// Holds the hand-over word of a subframe against the time expected.
-fn check_time(timebase: &mut Timebase, start: i64, reading: &Reading) -> Result<(), LossReason> {
-    let expected = timebase.hand_over_at(start).subframe_count;
-    let agrees = |found: HandOver| found.subframe_count == expected;
-    if reading.hand_over().is_some_and(agrees) {
-        timebase.confirmed = timebase.confirmed.max(start);
-        timebase.polarity = reading.polarity.unwrap_or(timebase.polarity);
-        return Ok(());
-    }
-    if reading.words[0].is_some() && reading.words[1].is_some() {
-        return Err(LossReason::Contradiction);
-    }
-    if start - timebase.confirmed >= LONGEST_SILENCE_BITS {
-        return Err(LossReason::Silence);
-    }
-    Ok(())
 }
 
 fn read_page(id: u8, reading: &Reading) -> Option<LnavEvent> {

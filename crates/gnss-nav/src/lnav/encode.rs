@@ -147,7 +147,7 @@ impl LnavEncoder {
     /// The 300 bits of the subframe that is being sent at `time`, first bit first.
     ///
     /// # Errors
-    /// [`NavError::Value`] where `time` is half a week or more from the reference times of the
+    /// [`NavError::Value`] where `time` is more than half a week from the reference times of the
     /// ephemeris.
     pub fn subframe(&self, time: GpsTime) -> Result<[bool; SUBFRAME_BITS], NavError> {
         let hand_over = HandOver {

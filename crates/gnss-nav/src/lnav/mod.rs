@@ -6,18 +6,23 @@ mod assembly;
 mod bit_buffer;
 mod decode;
 mod encode;
+mod event;
 mod field;
 mod frame_sync;
 mod reading;
+#[cfg(test)]
+mod real_data_tests;
 mod subframe;
 #[cfg(test)]
 mod test_support;
 #[cfg(test)]
 mod tests;
+mod timebase;
 mod word;
 
-pub use decode::{LnavDecoder, LnavEvent, LossReason, NavBit};
+pub use decode::LnavDecoder;
 pub use encode::{LnavEncoder, quantise};
+pub use event::{LnavEvent, LossReason, NavBit};
 pub use frame_sync::Polarity;
 pub use subframe::almanac::Almanac;
 pub use subframe::hand_over::HandOver;

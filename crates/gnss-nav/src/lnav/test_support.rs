@@ -16,8 +16,8 @@ pub(super) fn random_bits(seed: u64, count: usize) -> Vec<bool> {
 /// An ephemeris over the whole range of its fields from numbers in [-1, 1) and whole ones.
 fn ephemeris_of(u: [f64; 20], iodc: u16, flags: u16, week: i32, steps: (i32, i32)) -> Ephemeris {
     let pi = std::f64::consts::PI;
-    // Largest values: see the tables of IS-GPS-200; 0.9999 keeps the rounded ones inside.
-    let full = |u: f64, bits: i32, step: i32| 0.9999 * u * 2_f64.powi(bits - 1 + step);
+    // The whole range of a two's complement field in steps of 2^step.
+    let full = |u: f64, bits: i32, step: i32| u * (2_f64.powi(bits - 1) - 1.0) * 2_f64.powi(step);
     let toe = GpsTime::from_parts(week, i64::from(steps.0) * 16, 0.0);
     Ephemeris {
         satellite: SatelliteId::gps(7),

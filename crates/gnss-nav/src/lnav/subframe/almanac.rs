@@ -1,7 +1,9 @@
 //! Almanac pages: pages 1 to 24 of subframe 5, 2 to 5 and 7 to 10 of subframe 4
 //! (IS-GPS-200, 20.3.3.5.1.2).
 
-use crate::lnav::field::{Field, GPS_PI, Term};
+use std::f64::consts::PI;
+
+use crate::lnav::field::{Field, Term};
 use crate::lnav::word::{DataWords, Run};
 use crate::{NavError, SatelliteId};
 
@@ -76,7 +78,7 @@ impl Almanac {
     /// Inclination, rad.
     #[must_use]
     pub fn inclination_rad(&self) -> f64 {
-        0.3 * GPS_PI + self.delta_i_rad
+        0.3 * PI + self.delta_i_rad
     }
 
     /// The same with every number rounded to what the message holds.

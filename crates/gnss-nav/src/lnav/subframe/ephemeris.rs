@@ -102,7 +102,7 @@ pub(in crate::lnav) const fn set_week(subframe_1: &mut DataWords, time: GpsTime)
     subframe_1.set_bits(WEEK, time.week() as u32);
 }
 
-/// Refuses reference times half a week or more from `time`: a receiver would take them for those
+/// Refuses reference times more than half a week from `time`: a receiver would take them for those
 /// of another week.
 ///
 /// # Errors

@@ -3,7 +3,7 @@
 use super::week::unroll_week;
 use crate::lnav::field::{Field, Term};
 use crate::lnav::word::{DataWords, Run};
-use crate::{GpsTime, NavError};
+use crate::{GpsTime, Klobuchar, NavError};
 
 /// SV (page) ID that this page is sent under.
 pub(in crate::lnav) const SV_ID: u32 = 56;
@@ -11,10 +11,8 @@ pub(in crate::lnav) const SV_ID: u32 = 56;
 /// Klobuchar coefficients and the offset of UTC from GPS time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct IonosphereUtc {
-    /// Amplitude of the vertical delay: s, s/semicircle, s/semicircle^2, s/semicircle^3.
-    pub alpha: [f64; 4],
-    /// Period: s, s/semicircle, s/semicircle^2, s/semicircle^3.
-    pub beta: [f64; 4],
+    /// Ionosphere.
+    pub klobuchar: Klobuchar,
     /// UTC.
     pub utc: UtcParameters,
 }
@@ -50,14 +48,30 @@ impl UtcParameters {
 }
 
 const TERMS: [Term<IonosphereUtc>; 10] = [
-    Term::new(Field::signed("alpha0", (69, 8), -30), |p| &mut p.alpha[0]),
-    Term::new(Field::signed("alpha1", (77, 8), -27), |p| &mut p.alpha[1]),
-    Term::new(Field::signed("alpha2", (91, 8), -24), |p| &mut p.alpha[2]),
-    Term::new(Field::signed("alpha3", (99, 8), -24), |p| &mut p.alpha[3]),
-    Term::new(Field::signed("beta0", (107, 8), 11), |p| &mut p.beta[0]),
-    Term::new(Field::signed("beta1", (121, 8), 14), |p| &mut p.beta[1]),
-    Term::new(Field::signed("beta2", (129, 8), 16), |p| &mut p.beta[2]),
-    Term::new(Field::signed("beta3", (137, 8), 16), |p| &mut p.beta[3]),
+    Term::new(Field::signed("alpha0", (69, 8), -30), |p| {
+        &mut p.klobuchar.alpha[0]
+    }),
+    Term::new(Field::signed("alpha1", (77, 8), -27), |p| {
+        &mut p.klobuchar.alpha[1]
+    }),
+    Term::new(Field::signed("alpha2", (91, 8), -24), |p| {
+        &mut p.klobuchar.alpha[2]
+    }),
+    Term::new(Field::signed("alpha3", (99, 8), -24), |p| {
+        &mut p.klobuchar.alpha[3]
+    }),
+    Term::new(Field::signed("beta0", (107, 8), 11), |p| {
+        &mut p.klobuchar.beta[0]
+    }),
+    Term::new(Field::signed("beta1", (121, 8), 14), |p| {
+        &mut p.klobuchar.beta[1]
+    }),
+    Term::new(Field::signed("beta2", (129, 8), 16), |p| {
+        &mut p.klobuchar.beta[2]
+    }),
+    Term::new(Field::signed("beta3", (137, 8), 16), |p| {
+        &mut p.klobuchar.beta[3]
+    }),
     Term::new(Field::signed("a1", (151, 24), -50), |p| &mut p.utc.a1),
     Term::new(
         Field::signed("a0_s", (211, 8), -30).with_high((181, 24)),
@@ -79,8 +93,10 @@ impl IonosphereUtc {
     /// Reads words 3 to 10 of the page.
     pub(in crate::lnav) fn read(page: &DataWords) -> Self {
         let mut parameters = Self {
-            alpha: [0.0; 4],
-            beta: [0.0; 4],
+            klobuchar: Klobuchar {
+                alpha: [0.0; 4],
+                beta: [0.0; 4],
+            },
             utc: UtcParameters {
                 a0_s: 0.0,
                 a1: 0.0,
