@@ -1,8 +1,13 @@
 //! GPS software receiver: samples in, positions and verdicts out.
 
+pub mod config;
+pub mod cost;
 mod error;
 pub mod record;
+pub mod rinex_nav;
+pub mod sigmf;
 pub mod sink;
 pub mod summary;
+pub mod truth;
 
 pub use error::ReceiverError;

@@ -1,6 +1,7 @@
 //! What the pipeline reports: plain records, written by sinks, never read back.
 
 use gnss_nav::{Ephemeris, GpsTime, SatelliteId};
+pub use gnss_signal::tracking::Lock;
 use nalgebra::Vector3;
 use num_complex::Complex64;
 
@@ -101,32 +102,6 @@ pub struct PvtRecord {
     pub vertical_protection_m: Option<f64>,
     /// How far it can be relied on.
     pub status: Status,
-}
-
-/// What a channel sees.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Lock {
-    /// Pulling in after acquisition.
-    PullIn,
-    /// Code and frequency follow the signal.
-    Code,
-    /// Carrier phase follows the signal.
-    Carrier,
-    /// The signal is gone.
-    Lost,
-}
-
-impl Lock {
-    /// Name in the output files.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::PullIn => "pull_in",
-            Self::Code => "code",
-            Self::Carrier => "carrier",
-            Self::Lost => "lost",
-        }
-    }
 }
 
 /// Who steers a channel's oscillators.

@@ -4,7 +4,10 @@ mod calendar;
 pub mod channels;
 pub mod events;
 pub mod file;
+pub mod navigation;
+pub mod observations;
 pub mod pvt;
+mod rinex_header;
 #[cfg(test)]
 pub(crate) mod sample_records;
 pub mod taps;

@@ -1,0 +1,371 @@
+//! From the channels' epochs to position, velocity and time.
+
+use gnss_nav::atmosphere::Klobuchar;
+use gnss_nav::coarse_time::{self, Prior, SnapshotMeasurement};
+use gnss_nav::constants::{L1_HZ, L1_WAVELENGTH_M, SPEED_OF_LIGHT_MPS};
+use gnss_nav::least_squares::{self, Consistency, Solution};
+use gnss_nav::measurement::{ErrorModel, Formed, MeasurementModel, RawMeasurement, form};
+use gnss_nav::prediction::{Expected, ReceiverState, predict};
+use gnss_nav::{Ephemeris, EphemerisStore, GpsTime, SatelliteId};
+use gnss_signal::tracking::{ChannelEpoch, Lock};
+use nalgebra::Vector3;
+
+use super::clock::{ClockTrust, ReceiverClock};
+use super::settings::Settings;
+use super::slot::{Slot, transmit_fraction_s};
+use crate::record::Source;
+
+/// Travel time assumed before the first fix, s: the middle between zenith and horizon.
+const TYPICAL_TRAVEL_S: f64 = 0.075;
+/// Chance of leaving out a good satellite at one epoch.
+pub(super) const EXCLUSION_FALSE_ALARM: f64 = 1e-5;
+/// A coarse time this good, s, tells which bit boundary is which (10 ms is half a bit).
+const BIT_SAFE_SIGMA_S: f64 = 2.5e-3;
+/// Bit boundaries of all satellites agree to this with a position good to 100 km, s.
+const BIT_AGREEMENT_S: f64 = 0.5e-3;
+
+/// A channel with its epoch.
+pub(super) struct Tracked<'a> {
+    pub(super) slot: &'a mut Slot,
+    pub(super) epoch: ChannelEpoch,
+}
+
+/// What an epoch brought.
+#[derive(Debug, Clone)]
+pub(super) struct Navigated {
+    /// The solution, where there is one.
+    pub(super) fix: Option<(Solution, Source)>,
+    /// Receiver clock at the epoch, where it is good enough for pseudoranges.
+    pub(super) receive_time: Option<GpsTime>,
+    /// The measurements, where the clock is good enough.
+    pub(super) raw: Vec<RawMeasurement>,
+    /// The same with satellite states.
+    pub(super) formed: Formed,
+}
+
+/// Knows ephemerides, time and place, and finds the next.
+#[derive(Debug)]
+pub(super) struct Navigator {
+    pub(super) store: EphemerisStore,
+    ionosphere: Option<Klobuchar>,
+    use_ionosphere: bool,
+    troposphere: bool,
+    mask_rad: f64,
+    sample_rate_hz: f64,
+    /// Any recent GPS time, to tell weeks apart.
+    near: Option<GpsTime>,
+    clock: Option<ReceiverClock>,
+    place: Option<Place>,
+}
+
+/// Where the receiver was.
+#[derive(Debug, Clone, Copy)]
+struct Place {
+    position_ecef_m: Vector3<f64>,
+    velocity_ecef_mps: Vector3<f64>,
+    clock_drift_mps: f64,
+    solved: bool,
+}
+
+impl Navigator {
+    pub(super) fn new(settings: &Settings, sample_rate_hz: f64) -> Self {
+        let aiding = &settings.aiding;
+        let clock = aiding
+            .time
+            .map(|t| ReceiverClock::new(0, t, ClockTrust::Coarse, sample_rate_hz));
+        let place = aiding.position_ecef_m.map(|position_ecef_m| Place {
+            position_ecef_m,
+            velocity_ecef_mps: Vector3::zeros(),
+            clock_drift_mps: 0.0,
+            solved: false,
+        });
+        Self {
+            store: aiding.ephemerides.iter().copied().collect(),
+            ionosphere: aiding.ionosphere,
+            use_ionosphere: settings.ionosphere,
+            troposphere: settings.troposphere,
+            mask_rad: settings.elevation_mask_rad,
+            sample_rate_hz,
+            near: aiding.time,
+            clock,
+            place,
+        }
+    }
+
+    /// Takes the week from a message.
+    pub(super) fn learn_time(&mut self, time: GpsTime) {
+        self.near = Some(time);
+    }
+
+    /// Takes an ephemeris; tells whether it is new.
+    pub(super) fn learn_ephemeris(&mut self, ephemeris: Ephemeris) -> bool {
+        self.store.insert(ephemeris)
+    }
+
+    /// Takes the ionosphere model from a message.
+    pub(super) fn learn_ionosphere(&mut self, model: Klobuchar) {
+        self.ionosphere = Some(model);
+    }
+
+    /// A recent GPS time, if any is known.
+    pub(super) const fn near(&self) -> Option<GpsTime> {
+        self.near
+    }
+
+    /// Samples were lost or repeated: time is only roughly known from here on.
+    pub(super) fn time_jumped(&mut self) {
+        if let Some(clock) = &mut self.clock {
+            clock.trust = ClockTrust::Coarse;
+        }
+    }
+
+    /// Whether `satellite` is known to be below the horizon.
+    pub(super) fn is_below_horizon(&self, satellite: SatelliteId, tick: u64) -> bool {
+        self.expected(satellite, tick).is_some_and(|e| {
+            let margin = 10f64.to_radians();
+            e.look.elevation_rad < -margin
+        })
+    }
+
+    /// What is expected of a satellite, where time, place and ephemeris are known.
+    fn expected(&self, satellite: SatelliteId, tick: u64) -> Option<Expected> {
+        let place = self.place?;
+        let time = self.clock?.at(tick);
+        let ephemeris = self.store.select(satellite, time)?;
+        let receiver = ReceiverState {
+            time,
+            position_ecef_m: place.position_ecef_m,
+            velocity_ecef_mps: place.velocity_ecef_mps,
+            clock_drift_mps: place.clock_drift_mps,
+        };
+        predict(ephemeris, &receiver).ok()
+    }
+
+    /// Errors beyond tracking noise are those of real signals.
+    fn model(&self) -> MeasurementModel {
+        MeasurementModel {
+            ionosphere: self.ionosphere.filter(|_| self.use_ionosphere),
+            troposphere: self.troposphere,
+            elevation_mask_rad: self.mask_rad,
+            errors: ErrorModel::default(),
+        }
+    }
+
+    /// Finds position, velocity and time at `tick`.
+    pub(super) fn navigate(&mut self, tick: u64, tracked: &mut [Tracked]) -> Navigated {
+        self.set_clock_by_message(tick, tracked);
+        let trust = self.clock.map(|c| c.trust);
+        if trust == Some(ClockTrust::Coarse) {
+            if let Some((solution, time_sigma_s)) = self.snapshot(tick, tracked) {
+                self.settle(tick, &solution);
+                if time_sigma_s < BIT_SAFE_SIGMA_S {
+                    self.set_clock_by_bits(tick, tracked);
+                }
+                return self.result(tick, tracked, Some((solution, Source::Snapshot)));
+            }
+            return self.result(tick, tracked, None);
+        }
+        let (raw, formed) = self.measurements(tick, tracked);
+        let start = self.place.map_or_else(Vector3::zeros, |p| p.position_ecef_m);
+        let solved = least_squares::solve_with_exclusion(
+            &formed.measurements,
+            &self.model(),
+            &start,
+            EXCLUSION_FALSE_ALARM,
+        );
+        let fix = solved.ok().map(|mut solution| {
+            self.set_clock_by_fix(&mut solution);
+            self.settle(tick, &solution);
+            (solution, Source::LeastSquares)
+        });
+        Navigated {
+            receive_time: self.clock.map(|c| c.at(tick)),
+            fix,
+            raw,
+            formed,
+        }
+    }
+
+    fn result(
+        &self,
+        tick: u64,
+        tracked: &[Tracked],
+        fix: Option<(Solution, Source)>,
+    ) -> Navigated {
+        let exact = self.clock.is_some_and(|c| c.trust == ClockTrust::Fix);
+        let (raw, formed) = if exact {
+            self.measurements(tick, tracked)
+        } else {
+            Default::default()
+        };
+        Navigated {
+            fix,
+            receive_time: self.clock.filter(|_| exact).map(|c| c.at(tick)),
+            raw,
+            formed,
+        }
+    }
+
+    /// The first transmit time decoded sets the clock to within the spread of travel times.
+    fn set_clock_by_message(&mut self, tick: u64, tracked: &[Tracked]) {
+        if self.clock.is_some_and(|c| c.trust != ClockTrust::Coarse) {
+            return;
+        }
+        let Some(near) = self.near else { return };
+        let latest = tracked
+            .iter()
+            .filter_map(|t| t.slot.transmit_time(&t.epoch, near))
+            .max_by(|a, b| (*a - *b).total_cmp(&0.0));
+        if let Some(latest) = latest {
+            let time = latest + TYPICAL_TRAVEL_S;
+            let clock = ReceiverClock::new(tick, time, ClockTrust::Message, self.sample_rate_hz);
+            self.clock = Some(clock);
+        }
+    }
+
+    /// After the first fix the clock is right.
+    fn set_clock_by_fix(&mut self, solution: &mut Solution) {
+        let Some(clock) = &mut self.clock else { return };
+        if clock.trust == ClockTrust::Message {
+            clock.correct(solution.clock_bias_m);
+            let bias_s = solution.clock_bias_m / SPEED_OF_LIGHT_MPS;
+            solution.receive_time = solution.receive_time - bias_s;
+            solution.clock_bias_m = 0.0;
+        }
+    }
+
+    fn settle(&mut self, tick: u64, solution: &Solution) {
+        let velocity = solution.velocity.as_ref();
+        self.place = Some(Place {
+            position_ecef_m: solution.position_ecef_m,
+            velocity_ecef_mps: velocity.map_or_else(Vector3::zeros, |v| v.velocity_ecef_mps),
+            clock_drift_mps: velocity.map_or(0.0, |v| v.clock_drift_mps),
+            solved: true,
+        });
+        self.near = Some(solution.gps_time());
+        if let Some(clock) = &mut self.clock
+            && clock.trust == ClockTrust::Coarse
+        {
+            *clock = ReceiverClock::new(
+                tick,
+                solution.gps_time(),
+                ClockTrust::Coarse,
+                self.sample_rate_hz,
+            );
+        }
+    }
+
+    /// Position and time from code phases and Dopplers alone, and the deviation of the time, s.
+    fn snapshot(&self, tick: u64, tracked: &[Tracked]) -> Option<(Solution, f64)> {
+        let clock = self.clock?;
+        let measurements: Vec<_> = tracked
+            .iter()
+            .map(|t| SnapshotMeasurement {
+                satellite: t.slot.satellite,
+                transmit_fraction_s: transmit_fraction_s(&t.epoch),
+                doppler_hz: t.epoch.doppler_hz,
+                code_variance_m2: code_variance_m2(&t.epoch),
+                doppler_variance_hz2: t.epoch.doppler_variance_hz2,
+            })
+            .collect();
+        let prior = Prior::new(clock.at(tick), self.place.map(|p| p.position_ecef_m));
+        let solved = coarse_time::solve(
+            &measurements,
+            &self.store,
+            &prior,
+            &self.model(),
+            EXCLUSION_FALSE_ALARM,
+        );
+        solved.ok().map(|s| (s.solution, s.time_sigma_s))
+    }
+
+    /// Once a coarse-time solution is good to a few milliseconds, the bit boundaries, which leave
+    /// every satellite at multiples of 20 ms, make the clock exact.
+    fn set_clock_by_bits(&mut self, tick: u64, tracked: &[Tracked]) {
+        let Some(mut clock) = self.clock else { return };
+        let bit_s = 0.02;
+        let offsets: Vec<f64> = tracked
+            .iter()
+            .filter_map(|t| {
+                let periods = f64::from(t.epoch.periods_into_bit?);
+                let expected = self.expected(t.slot.satellite, tick)?.transmit_time;
+                let into_bit = periods * 1e-3 + transmit_fraction_s(&t.epoch);
+                // A second holds a whole number of bits.
+                let difference = into_bit - expected.fraction_s();
+                Some((difference / bit_s - (difference / bit_s).round()) * bit_s)
+            })
+            .collect();
+        let n = offsets.len() as f64;
+        let mean = offsets.iter().sum::<f64>() / n;
+        let spread = offsets.iter().map(|o| (o - mean).abs()).fold(0.0, f64::max);
+        if n >= 4.0 && spread < BIT_AGREEMENT_S && mean.abs() < 4.0 * BIT_SAFE_SIGMA_S {
+            clock.time = clock.time + mean;
+            clock.trust = ClockTrust::Fix;
+            self.clock = Some(clock);
+        }
+    }
+
+    /// Pseudoranges and range rates of all channels whose transmit time is known.
+    fn measurements(&self, tick: u64, tracked: &[Tracked]) -> (Vec<RawMeasurement>, Formed) {
+        let Some(clock) = self.clock else {
+            return Default::default();
+        };
+        let receive_time = clock.at(tick);
+        let raw: Vec<_> = tracked
+            .iter()
+            .filter(|t| matches!(t.epoch.lock, Lock::Code | Lock::Carrier))
+            .filter_map(|t| {
+                let transmit_time = self.transmit_time(&clock, tick, t)?;
+                Some(raw_measurement(&t.epoch, t.slot.satellite, receive_time, transmit_time))
+            })
+            .collect();
+        let formed = form(receive_time, &raw, &self.store);
+        (raw, formed)
+    }
+
+    /// Transmit time of a channel, by its message or, once there was a fix, by prediction.
+    fn transmit_time(&self, clock: &ReceiverClock, tick: u64, t: &Tracked) -> Option<GpsTime> {
+        let decoded = t.slot.transmit_time(&t.epoch, clock.at(tick));
+        decoded.or_else(|| {
+            let known = clock.trust == ClockTrust::Fix && self.place.is_some_and(|p| p.solved);
+            let expected = self.expected(t.slot.satellite, tick).filter(|_| known)?;
+            let fraction = transmit_fraction_s(&t.epoch);
+            let milliseconds = (expected.transmit_time.fraction_s() - fraction) * 1e3;
+            let whole = GpsTime::from_parts(
+                expected.transmit_time.week(),
+                i64::from(expected.transmit_time.second()),
+                0.0,
+            );
+            Some(whole + (milliseconds.round() * 1e-3 + fraction))
+        })
+    }
+}
+
+fn code_variance_m2(epoch: &ChannelEpoch) -> f64 {
+    let chip_m = SPEED_OF_LIGHT_MPS / epoch.signal.spec().code_rate_hz;
+    epoch.code_variance_chips2 * chip_m * chip_m
+}
+
+fn raw_measurement(
+    epoch: &ChannelEpoch,
+    satellite: SatelliteId,
+    receive_time: GpsTime,
+    transmit_time: GpsTime,
+) -> RawMeasurement {
+    let wavelength_m = L1_WAVELENGTH_M;
+    debug_assert!((L1_HZ - epoch.signal.spec().carrier_hz).abs() < 1.0);
+    RawMeasurement {
+        satellite,
+        transmit_time,
+        pseudorange_m: RawMeasurement::pseudorange_m(receive_time, transmit_time),
+        range_rate_mps: -wavelength_m * epoch.doppler_hz,
+        pseudorange_variance_m2: code_variance_m2(epoch),
+        range_rate_variance_m2: wavelength_m * wavelength_m * epoch.doppler_variance_hz2,
+        cn0_dbhz: epoch.cn0_dbhz,
+    }
+}
+
+/// Whether the measurements of a solution contradict each other.
+pub(super) fn is_contradictory(solution: &Solution) -> bool {
+    matches!(solution.consistency, Consistency::Failed)
+}

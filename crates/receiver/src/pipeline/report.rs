@@ -1,0 +1,157 @@
+//! Records of a navigation epoch.
+
+use gnss_nav::constants::L1_WAVELENGTH_M;
+use gnss_nav::geodesy::Geodetic;
+use gnss_nav::least_squares::Solution;
+use gnss_nav::{SatelliteId, chi_square_threshold};
+use gnss_signal::tracking::{ChannelEpoch, Lock};
+use nalgebra::Vector3;
+
+use super::navigator::{Navigated, Tracked, is_contradictory};
+use crate::record::{
+    CarrierPhase, ChannelRecord, Disposition, InnovationRecord, LoopMembership, Observation,
+    ObservationEpoch, PvtRecord, Source, Status,
+};
+
+/// The solution as a record.
+pub(super) fn pvt(time_s: f64, solution: &Solution, source: Source) -> PvtRecord {
+    let geodetic = Geodetic::from_ecef(&solution.position_ecef_m);
+    let to_enu = geodetic.enu_from_ecef();
+    let position_covariance = solution.covariance_m2.fixed_view::<3, 3>(0, 0);
+    let enu = to_enu * position_covariance * to_enu.transpose();
+    let velocity = solution.velocity.as_ref();
+    let velocity_variance = velocity.map_or(f64::INFINITY, |v| {
+        v.covariance_m2_s2.fixed_view::<3, 3>(0, 0).trace()
+    });
+    PvtRecord {
+        time_s,
+        time: solution.gps_time(),
+        position_ecef_m: solution.position_ecef_m,
+        velocity_ecef_mps: velocity.map_or_else(Vector3::zeros, |v| v.velocity_ecef_mps),
+        clock_bias_m: solution.clock_bias_m,
+        clock_drift_mps: velocity.map_or(0.0, |v| v.clock_drift_mps),
+        satellites_used: solution.satellites.len(),
+        pdop: solution.dops.pdop,
+        source,
+        sigma_enu_m: [enu[(0, 0)].sqrt(), enu[(1, 1)].sqrt(), enu[(2, 2)].sqrt()],
+        sigma_velocity_mps: velocity_variance.sqrt(),
+        horizontal_protection_m: None,
+        vertical_protection_m: None,
+        status: if is_contradictory(solution) {
+            Status::Unreliable
+        } else {
+            Status::Fix
+        },
+    }
+}
+
+/// All observations of an epoch.
+pub(super) fn observations(
+    time_s: f64,
+    tracked: &mut [Tracked],
+    navigated: &Navigated,
+) -> Option<ObservationEpoch> {
+    let time = navigated.receive_time?;
+    let observations = tracked
+        .iter_mut()
+        .filter_map(|t| observation(t, navigated))
+        .collect();
+    Some(ObservationEpoch {
+        time_s,
+        time,
+        observations,
+    })
+}
+
+fn observation(tracked: &mut Tracked, navigated: &Navigated) -> Option<Observation> {
+    let satellite = tracked.slot.satellite;
+    let raw = navigated.raw.iter().find(|r| r.satellite == satellite)?;
+    let epoch = &tracked.epoch;
+    let cycles = raw.pseudorange_m / L1_WAVELENGTH_M;
+    let (phase, half_cycle) = tracked.slot.carrier_phase(epoch, cycles);
+    let look = navigated.fix.as_ref().and_then(|(solution, _)| {
+        solution
+            .satellites
+            .iter()
+            .find(|s| s.satellite == satellite)
+    });
+    Some(Observation {
+        satellite,
+        pseudorange_m: raw.pseudorange_m,
+        doppler_hz: epoch.doppler_hz,
+        cn0_dbhz: epoch.cn0_dbhz,
+        carrier_phase: (epoch.lock == Lock::Carrier).then_some(CarrierPhase {
+            cycles: phase,
+            loss_of_lock: epoch.phase_slipped,
+            half_cycle,
+        }),
+        azimuth_rad: look.map(|l| l.azimuth_rad),
+        elevation_rad: look.map(|l| l.elevation_rad),
+    })
+}
+
+/// A channel as a record.
+pub(super) fn channel(time_s: f64, tracked: &Tracked, navigated: &Navigated) -> ChannelRecord {
+    let satellite = tracked.slot.satellite;
+    let epoch: &ChannelEpoch = &tracked.epoch;
+    let raw = navigated.raw.iter().find(|r| r.satellite == satellite);
+    let (innovation_code_m, innovation_rate_mps) = residuals(satellite, navigated);
+    ChannelRecord {
+        time_s,
+        satellite,
+        cn0_dbhz: epoch.cn0_dbhz,
+        lock: epoch.lock,
+        membership: LoopMembership::Scalar,
+        prompt: epoch.prompt,
+        code_error_chips: epoch.code_error_chips,
+        frequency_error_hz: epoch.frequency_error_hz,
+        pseudorange_m: raw.map(|r| r.pseudorange_m),
+        range_rate_mps: raw.map(|r| r.range_rate_mps),
+        innovation_code_m,
+        innovation_rate_mps,
+        disposition: disposition(satellite, navigated),
+        scores: Vec::new(),
+    }
+}
+
+fn disposition(satellite: SatelliteId, navigated: &Navigated) -> Disposition {
+    let Some((solution, _)) = &navigated.fix else {
+        return Disposition::Unavailable;
+    };
+    if solution.excluded.contains(&satellite) {
+        Disposition::Exclude
+    } else if solution.satellites.iter().any(|s| s.satellite == satellite) {
+        Disposition::Use
+    } else {
+        Disposition::Unavailable
+    }
+}
+
+type Residuals = (Option<InnovationRecord>, Option<InnovationRecord>);
+
+/// What is left of the measurements after the solution.
+fn residuals(satellite: SatelliteId, navigated: &Navigated) -> Residuals {
+    let used = navigated.fix.as_ref().and_then(|(solution, _)| {
+        solution
+            .satellites
+            .iter()
+            .find(|s| s.satellite == satellite)
+    });
+    let code = used.map(|u| InnovationRecord {
+        value: u.pseudorange_residual_m,
+        sigma: u.pseudorange_sigma_m,
+    });
+    let raw = navigated.raw.iter().find(|r| r.satellite == satellite);
+    let rate = used.and_then(|u| {
+        Some(InnovationRecord {
+            value: u.range_rate_residual_mps?,
+            sigma: raw?.range_rate_variance_m2.sqrt(),
+        })
+    });
+    (code, rate)
+}
+
+/// The limit of the residual test as events report it, in units of its own chi-square.
+pub(super) fn residual_threshold(solution: &Solution, false_alarm: f64) -> f64 {
+    chi_square_threshold(solution.degrees_of_freedom().max(1), false_alarm).unwrap_or(f64::INFINITY)
+}

@@ -1,0 +1,130 @@
+//! When to search for which signals.
+
+use std::collections::BTreeMap;
+
+use gnss_signal::{AcquisitionHit, SearchRequest, SignalId, default_search};
+
+use super::settings::Settings;
+
+/// First searches, from the first sample on, ms: short for what is strong, longer for the rest.
+const FIRST_SEARCHES_MS: [u32; 2] = [20, 60];
+/// Later searches for what is not tracked look at this much, ms, ...
+const LATER_SEARCH_MS: u32 = 60;
+/// ... this often, s: satellites rise and buildings end slowly.
+const LATER_PERIOD_S: f64 = 15.0;
+/// A signal lost is looked for this often, s, ...
+const LOST_PERIOD_S: f64 = 0.5;
+/// ... for this long, s, ...
+const LOST_MEMORY_S: f64 = 30.0;
+/// ... this far from its last Doppler, Hz: 10 s of 1 g.
+const LOST_HALF_WIDTH_HZ: f64 = 500.0;
+
+/// Decides when to search.
+#[derive(Debug)]
+pub(super) struct Schedule {
+    sample_rate_hz: f64,
+    next_first: usize,
+    next_later_s: f64,
+    next_lost_s: f64,
+    lost: BTreeMap<SignalId, Lost>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Lost {
+    since_s: f64,
+    doppler_hz: f64,
+}
+
+impl Schedule {
+    pub(super) fn new(sample_rate_hz: f64) -> Self {
+        Self {
+            sample_rate_hz,
+            next_first: 0,
+            next_later_s: LATER_PERIOD_S,
+            next_lost_s: 0.0,
+            lost: BTreeMap::new(),
+        }
+    }
+
+    /// A channel lost its signal.
+    pub(super) fn lost(&mut self, signal: SignalId, doppler_hz: f64, now_s: f64) {
+        let lost = Lost {
+            since_s: now_s,
+            doppler_hz,
+        };
+        self.lost.insert(signal, lost);
+    }
+
+    /// A signal is tracked again.
+    pub(super) fn found(&mut self, hit: &AcquisitionHit) {
+        self.lost.remove(&hit.signal);
+    }
+
+    /// The searches due at `now` (a tick), given whether the samples end here and which signals
+    /// are wanted.
+    pub(super) fn due(
+        &mut self,
+        now: u64,
+        ended: bool,
+        wanted: &[SignalId],
+        settings: &Settings,
+    ) -> Vec<SearchRequest> {
+        let now_s = now as f64 / self.sample_rate_hz;
+        if let Some(ms) = self.first_due(now_s, ended) {
+            return vec![self.request(wanted.to_vec(), 0, ms, settings)];
+        }
+        let span = (f64::from(LATER_SEARCH_MS + 2) * 1e-3 * self.sample_rate_hz) as u64;
+        let start = now.saturating_sub(span);
+        if now_s >= self.next_later_s {
+            self.next_later_s = now_s + LATER_PERIOD_S;
+            return vec![self.request(wanted.to_vec(), start, LATER_SEARCH_MS, settings)];
+        }
+        if now_s < self.next_lost_s {
+            return Vec::new();
+        }
+        self.next_lost_s = now_s + LOST_PERIOD_S;
+        self.lost.retain(|_, l| now_s - l.since_s < LOST_MEMORY_S);
+        let lost = self.lost.iter().filter(|(s, _)| wanted.contains(s));
+        lost.map(|(signal, lost)| SearchRequest {
+            doppler_centre_hz: lost.doppler_hz,
+            doppler_half_width_hz: LOST_HALF_WIDTH_HZ,
+            ..self.request(vec![*signal], start, LATER_SEARCH_MS, settings)
+        })
+        .collect()
+    }
+
+    /// Milliseconds of the first search due; at the end of short samples, as many as there are.
+    fn first_due(&mut self, now_s: f64, ended: bool) -> Option<u32> {
+        let due = *FIRST_SEARCHES_MS.get(self.next_first)?;
+        // One millisecond more: code periods do not begin at the first sample.
+        let held_ms = ((now_s * 1e3) as u32).saturating_sub(1);
+        if held_ms >= due {
+            self.next_first += 1;
+            Some(due)
+        } else if ended && held_ms > 0 {
+            self.next_first = FIRST_SEARCHES_MS.len();
+            Some(held_ms)
+        } else {
+            None
+        }
+    }
+
+    fn request(
+        &self,
+        signals: Vec<SignalId>,
+        start_tick: u64,
+        duration_ms: u32,
+        settings: &Settings,
+    ) -> SearchRequest {
+        let (coherent_periods, noncoherent_sums) = default_search(duration_ms);
+        SearchRequest {
+            signals,
+            start_tick,
+            doppler_centre_hz: 0.0,
+            doppler_half_width_hz: settings.doppler_half_width_hz,
+            coherent_periods,
+            noncoherent_sums,
+            false_alarm_probability: settings.false_alarm_probability,
+        }
+    }
+}
