@@ -54,6 +54,8 @@ pub struct Measurement {
     pub cn0_dbhz: f64,
     /// The satellite at transmission, in the frame of transmission.
     pub state: SatelliteState,
+    /// Nominal accuracy of its ephemeris, m.
+    pub user_range_accuracy_m: f64,
 }
 
 /// Measurements of one epoch, and what could not be used.
@@ -114,17 +116,18 @@ fn join(
         range_rate_variance_m2: raw.range_rate_variance_m2,
         cn0_dbhz: raw.cn0_dbhz,
         state,
+        user_range_accuracy_m: ephemeris.user_range_accuracy_m(),
     })
 }
 
 /// Variance that tracking noise does not cover.
 ///
-/// sigma^2 = signal_in_space^2 + (ionosphere_fraction I)^2 + (troposphere_fraction T)^2, where I
-/// and T are the modelled delays: a delay that is switched off adds nothing.
+/// sigma^2 = (ura_fraction URA)^2 + (ionosphere_fraction I)^2 + (troposphere_fraction T)^2, where
+/// I and T are the modelled delays: a delay that is switched off adds nothing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ErrorModel {
-    /// Broadcast orbit and clock, multipath, m.
-    pub signal_in_space_m: f64,
+    /// Error of broadcast orbit and clock over the nominal user range accuracy.
+    pub ura_fraction: f64,
     /// Part of the modelled ionospheric delay left over.
     pub ionosphere_fraction: f64,
     /// Part of the modelled tropospheric delay left over.
@@ -134,19 +137,19 @@ pub struct ErrorModel {
 impl ErrorModel {
     /// Tracking noise alone: for signals simulated with exactly the modelled delays.
     pub const TRACKING_NOISE_ONLY: Self = Self {
-        signal_in_space_m: 0.0,
+        ura_fraction: 0.0,
         ionosphere_fraction: 0.0,
         troposphere_fraction: 0.0,
     };
 }
 
 impl Default for ErrorModel {
-    /// For real signals: 1 m (the global average of the user range error by the GPS SPS
-    /// Performance Standard is below 2 m at 95 %), half the Klobuchar delay (what it leaves, by
-    /// IS-GPS-200 20.3.3.5.2.5), 5 % of the troposphere (0.12 m at the zenith).
+    /// For real signals: the user range accuracy as broadcast (it tells satellites with poor
+    /// clocks apart), half the Klobuchar delay (what it leaves, by IS-GPS-200 20.3.3.5.2.5), 5 %
+    /// of the troposphere (0.12 m at the zenith).
     fn default() -> Self {
         Self {
-            signal_in_space_m: 1.0,
+            ura_fraction: 1.0,
             ionosphere_fraction: 0.5,
             troposphere_fraction: 0.05,
         }
@@ -171,8 +174,8 @@ pub struct MeasurementModel {
 pub struct Predicted {
     /// Range, minus the satellite's clock, plus modelled delays, m.
     pub pseudorange_m: f64,
-    /// Variance of the delays and of the signal in space, m^2.
-    pub model_variance_m2: f64,
+    /// Variance left by the modelled delays, m^2.
+    pub delay_variance_m2: f64,
     /// Geometry.
     pub line_of_sight: LineOfSight,
     /// Where the satellite stands in the sky.
@@ -204,12 +207,24 @@ impl MeasurementModel {
             pseudorange_m: line_of_sight.range_m - SPEED_OF_LIGHT_MPS * state.clock_bias_s
                 + ionosphere_m
                 + troposphere_m,
-            model_variance_m2: errors.signal_in_space_m.powi(2)
-                + (errors.ionosphere_fraction * ionosphere_m).powi(2)
+            delay_variance_m2: (errors.ionosphere_fraction * ionosphere_m).powi(2)
                 + (errors.troposphere_fraction * troposphere_m).powi(2),
             line_of_sight,
             look,
         }
+    }
+
+    /// Variance of a pseudorange: tracking noise `code_variance_m2`, ephemeris, delays, m^2.
+    #[must_use]
+    pub fn variance_m2(
+        &self,
+        code_variance_m2: f64,
+        user_range_accuracy_m: f64,
+        predicted: &Predicted,
+    ) -> f64 {
+        code_variance_m2
+            + (self.errors.ura_fraction * user_range_accuracy_m).powi(2)
+            + predicted.delay_variance_m2
     }
 
     /// This model without delays, mask and model errors: for a position not yet known.

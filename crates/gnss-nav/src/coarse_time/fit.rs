@@ -173,7 +173,13 @@ fn see<'a>(
         predicted,
         state,
         residual_m: measured_m - predicted.pseudorange_m - bias_m,
-        sigma_m: (channel.code_variance_m2 + predicted.model_variance_m2).sqrt(),
+        sigma_m: model
+            .variance_m2(
+                channel.code_variance_m2,
+                channel.ephemeris.user_range_accuracy_m(),
+                &predicted,
+            )
+            .sqrt(),
     })
 }
 

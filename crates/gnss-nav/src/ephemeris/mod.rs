@@ -130,6 +130,18 @@ impl Ephemeris {
         }
     }
 
+    /// Nominal user range accuracy, m (IS-GPS-200 20.3.3.3.1.3); 8192 m where the control segment
+    /// predicts none (index 15 and beyond).
+    #[must_use]
+    pub fn user_range_accuracy_m(&self) -> f64 {
+        let index = f64::from(self.ura_index.min(15));
+        if index <= 6.0 {
+            (1.0 + index / 2.0).exp2()
+        } else {
+            (index - 2.0).exp2()
+        }
+    }
+
     /// Whether `time` lies within the curve fit interval.
     #[must_use]
     pub fn is_valid_at(&self, time: GpsTime) -> bool {

@@ -141,7 +141,7 @@ fn solve_subset(
         .map(|(m, p)| RateEquation::new(m, p))
         .collect();
     let velocity = solve_velocity(&rates).ok();
-    let satellites = used_satellites(&used, &fix, &rates, velocity.as_ref());
+    let satellites = used_satellites(&used, model, &fix, &rates, velocity.as_ref());
     Ok(Solution {
         receive_time: used
             .first()
@@ -164,6 +164,7 @@ fn solve_subset(
 
 fn used_satellites(
     used: &[&Measurement],
+    model: &MeasurementModel,
     fix: &position::Fix,
     rates: &[RateEquation],
     velocity: Option<&Velocity>,
@@ -175,14 +176,20 @@ fn used_satellites(
             azimuth_rad: p.look.azimuth_rad,
             elevation_rad: p.look.elevation_rad,
             pseudorange_residual_m: m.pseudorange_m - p.pseudorange_m - fix.clock_bias_m,
-            pseudorange_sigma_m: sigma_m(m, p),
+            pseudorange_sigma_m: sigma_m(m, model, p),
             range_rate_residual_mps: velocity.and_then(|v| rate.residual_mps(v)),
         })
         .collect()
 }
 
-fn sigma_m(measurement: &Measurement, predicted: &Predicted) -> f64 {
-    (measurement.pseudorange_variance_m2 + predicted.model_variance_m2).sqrt()
+fn sigma_m(measurement: &Measurement, model: &MeasurementModel, predicted: &Predicted) -> f64 {
+    model
+        .variance_m2(
+            measurement.pseudorange_variance_m2,
+            measurement.user_range_accuracy_m,
+            predicted,
+        )
+        .sqrt()
 }
 
 #[cfg(test)]

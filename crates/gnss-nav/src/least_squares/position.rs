@@ -53,7 +53,7 @@ pub(super) fn iterate(
         let rows: Vec<Row<4>> = measurements
             .iter()
             .zip(&predicted)
-            .map(|(m, p)| row(m, p, clock_m))
+            .map(|(m, p)| row(m, model, p, clock_m))
             .collect();
         let step = linear::solve(&rows)?;
         position += step.x.xyz();
@@ -72,11 +72,16 @@ pub(super) fn iterate(
     })
 }
 
-fn row(measurement: &Measurement, predicted: &Predicted, clock_m: f64) -> Row<4> {
+fn row(
+    measurement: &Measurement,
+    model: &MeasurementModel,
+    predicted: &Predicted,
+    clock_m: f64,
+) -> Row<4> {
     let e = predicted.line_of_sight.unit_ecef;
     Row {
         gradient: Vector4::new(-e.x, -e.y, -e.z, 1.0),
         residual: measurement.pseudorange_m - predicted.pseudorange_m - clock_m,
-        sigma: sigma_m(measurement, predicted),
+        sigma: sigma_m(measurement, model, predicted),
     }
 }

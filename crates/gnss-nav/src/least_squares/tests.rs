@@ -52,6 +52,7 @@ fn measure(k: usize, state: SatelliteState) -> Measurement {
         range_rate_variance_m2: 0.01,
         cn0_dbhz: 45.0,
         state,
+        user_range_accuracy_m: 2.0,
     }
 }
 
