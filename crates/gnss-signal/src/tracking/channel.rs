@@ -41,7 +41,8 @@ pub struct Channel {
 enum Stage {
     PullIn(PullIn),
     Steady(Box<Steady>),
-    Lost(SignalId),
+    /// With the last Doppler, Hz.
+    Lost(SignalId, f64),
 }
 
 /// Open-loop correlation from a fixed start.
@@ -93,7 +94,7 @@ impl Channel {
         match &self.stage {
             Stage::PullIn(p) => p.nco.signal,
             Stage::Steady(s) => s.nco.signal,
-            Stage::Lost(signal) => *signal,
+            Stage::Lost(signal, _) => *signal,
         }
     }
 
@@ -103,7 +104,26 @@ impl Channel {
         match &self.stage {
             Stage::PullIn(_) => Lock::PullIn,
             Stage::Steady(s) => s.lock(),
-            Stage::Lost(_) => Lock::Lost,
+            Stage::Lost(..) => Lock::Lost,
+        }
+    }
+
+    /// Doppler of the replica, Hz; the last one where the signal is lost.
+    #[must_use]
+    pub fn doppler_hz(&self) -> f64 {
+        match &self.stage {
+            Stage::PullIn(p) => p.nco.doppler_hz,
+            Stage::Steady(s) => s.nco.doppler_hz,
+            Stage::Lost(_, doppler_hz) => *doppler_hz,
+        }
+    }
+
+    /// Whether the signal stands well out of the noise of one integration, or did until now.
+    #[must_use]
+    pub fn is_strong(&self) -> bool {
+        match &self.stage {
+            Stage::Steady(s) => s.is_strong(),
+            Stage::PullIn(_) | Stage::Lost(..) => false,
         }
     }
 
@@ -112,7 +132,7 @@ impl Channel {
     pub fn faded_since(&self) -> Option<u64> {
         match &self.stage {
             Stage::Steady(s) => s.faded_since(),
-            Stage::PullIn(_) | Stage::Lost(_) => None,
+            Stage::PullIn(_) | Stage::Lost(..) => None,
         }
     }
 
@@ -125,7 +145,7 @@ impl Channel {
                 Some(p.nco.replica(p.nco.tick_of_period(p.nco.nearest_period() + 1), taps))
             }
             Stage::Steady(s) => Some(s.replica()),
-            Stage::Lost(_) => None,
+            Stage::Lost(..) => None,
         }
     }
 
@@ -149,14 +169,14 @@ impl Channel {
             Stage::Steady(s) => {
                 let bit = s.update(&sums, variance, replica.end_tick);
                 if s.lock() == Lock::Lost {
-                    self.stage = Stage::Lost(s.nco.signal);
+                    self.stage = Stage::Lost(s.nco.signal, s.nco.doppler_hz);
                 }
                 ChannelUpdate {
                     bit,
                     bit_sync: false,
                 }
             }
-            Stage::Lost(_) => ChannelUpdate::default(),
+            Stage::Lost(..) => ChannelUpdate::default(),
         }
     }
 
@@ -185,7 +205,7 @@ impl Channel {
                     p.restart(&found);
                 }
             }
-            _ if periods >= JUDGE_PERIODS => self.stage = Stage::Lost(p.nco.signal),
+            _ if periods >= JUDGE_PERIODS => self.stage = Stage::Lost(p.nco.signal, p.nco.doppler_hz),
             _ => {}
         }
         ChannelUpdate::default()
@@ -199,7 +219,7 @@ impl Channel {
         match &mut self.stage {
             Stage::PullIn(p) => p.epoch(tick, &self.settings),
             Stage::Steady(s) => Some(s.epoch(tick)),
-            Stage::Lost(_) => None,
+            Stage::Lost(..) => None,
         }
     }
 }
@@ -263,11 +283,15 @@ impl PullIn {
         let squaring = 1.0 + 2.0 / ((2.0 - spacing) * bit_snr);
         let tau = std::f64::consts::TAU;
         let last = self.stretch.last()?;
+        let first = self.start.nearest_period();
         Some(ChannelEpoch {
             signal: nco.signal,
             tick,
             code_period: nco.code_period,
             code_phase_chips: nco.code_phase_chips,
+            periods_into_bit: found
+                .bit_edge
+                .map(|edge| (nco.code_period - i64::from(edge) - first).rem_euclid(20) as u8),
             code_variance_chips2: spacing / (4.0 * snr) * squaring,
             doppler_hz: nco.doppler_hz,
             doppler_variance_hz2: 12.0 / (tau * tau * snr * length_s * length_s),

@@ -16,7 +16,9 @@ pub struct ChannelEpoch {
     pub code_period: i64,
     /// Code phase, chips, in [0, code length).
     pub code_phase_chips: f64,
-    /// Its variance, chips^2.
+    /// Code periods since the present data bit began, where bit boundaries are known.
+    pub periods_into_bit: Option<u8>,
+    /// Variance of the code phase, chips^2.
     pub code_variance_chips2: f64,
     /// Doppler, Hz.
     pub doppler_hz: f64,

@@ -16,6 +16,9 @@ const CN0_TIME_S: f64 = 1.0;
 /// Weight of a new difference of Dopplers in the acceleration that carries them to the epoch.
 const ACCELERATION_GAIN: f64 = 0.2;
 
+/// Ratio of signal to noise in one integration from which a fade is told from noise.
+const STRONG_SNR: f64 = 20.0;
+
 /// A signal tracked by its own loops.
 #[derive(Debug, Clone)]
 pub(super) struct Steady {
@@ -81,6 +84,11 @@ impl Steady {
         self.lock
     }
 
+    /// Whether the signal stands well out of the noise of one integration.
+    pub(super) fn is_strong(&self) -> bool {
+        self.cn0_hz * self.interval_s() > STRONG_SNR
+    }
+
     /// The tick at which the signal faded away while others say that it should be strong.
     pub(super) fn faded_since(&self) -> Option<u64> {
         (self.fade.integrations > 0).then_some(self.fade.since_tick)
@@ -127,8 +135,7 @@ impl Steady {
     fn watch_power(&mut self, prompt: Complex64, noise: f64, interval_s: f64, tick: u64) {
         let now = cn0::against_noise_floor(prompt, noise, interval_s);
         // Where the signal stands well out of the noise, a quarter of its power is no accident.
-        let expected_snr = self.cn0_hz * interval_s;
-        let faded = expected_snr > 20.0 && now < 0.25 * self.cn0_hz;
+        let faded = self.is_strong() && now < 0.25 * self.cn0_hz;
         self.fade = match (faded, self.fade.integrations) {
             (false, _) => Fade::default(),
             (true, 0) => Fade {
@@ -200,6 +207,9 @@ impl Steady {
             tick,
             code_period: at.code_period,
             code_phase_chips: at.code_phase_chips,
+            periods_into_bit: Some(
+                (at.code_period - self.bit_edge).rem_euclid(bit_periods(&at)) as u8
+            ),
             code_variance_chips2: self.code_variance_chips2(),
             doppler_hz,
             doppler_variance_hz2,

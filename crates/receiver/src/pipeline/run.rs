@@ -2,7 +2,6 @@
 
 use std::collections::BTreeSet;
 
-use gnss_nav::atmosphere::Klobuchar;
 use gnss_nav::lnav::{DEFAULT_PIVOT_WEEK, LnavEvent};
 use gnss_nav::{GpsTime, SatelliteId};
 use gnss_signal::tracking::NoiseFloor;
@@ -289,17 +288,14 @@ impl<B: CorrelatorBank> Run<'_, B> {
                 (self.sink)(Record::Ephemeris(ephemeris))
             }
             LnavEvent::IonosphereUtc(parameters) => {
-                self.navigator.learn_ionosphere(Klobuchar {
-                    alpha: parameters.alpha,
-                    beta: parameters.beta,
-                });
+                self.navigator.learn_ionosphere(parameters.klobuchar);
                 let Some(near) = self.navigator.near() else {
                     return Ok(());
                 };
                 self.emit(now, Some(satellite), EventKind::IonosphereUtcDecoded)?;
                 (self.sink)(Record::IonosphereUtc(IonosphereUtcRecord {
-                    alpha: parameters.alpha,
-                    beta: parameters.beta,
+                    alpha: parameters.klobuchar.alpha,
+                    beta: parameters.klobuchar.beta,
                     a0_s: parameters.utc.a0_s,
                     a1: parameters.utc.a1,
                     reference: parameters.utc.reference_time(near),
