@@ -79,3 +79,68 @@ pub fn saastamoinen_delay_m(receiver: &Geodetic, elevation_rad: f64) -> f64 {
     let wet_m = 0.002_277 * (1255.0 / temperature_k + 0.05) * vapour_hpa;
     (dry_m + wet_m) / elevation_rad.sin().max(1e-3)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const BRAUNSCHWEIG: Klobuchar = Klobuchar {
+        alpha: [1.77e-8, -7.451e-9, -5.96e-8, 1.192e-7],
+        beta: [131_100.0, -131_100.0, 65_540.0, -262_100.0],
+    };
+
+    fn look(azimuth_rad: f64, elevation_rad: f64) -> Look {
+        Look {
+            azimuth_rad,
+            elevation_rad,
+        }
+    }
+
+    #[test]
+    fn night_delay_at_the_zenith_is_five_nanoseconds() {
+        // 2 h local time at longitude 0; the slant factor at the zenith is 1 + 16 * 0.03^3.
+        let here = Geodetic::from_degrees(45.0, 0.0, 0.0);
+        let delay_m = BRAUNSCHWEIG.delay_m(&here, &look(0.0, PI / 2.0), GpsTime::new(0, 7_200.0));
+        let expected_m = SPEED_OF_LIGHT_MPS * 5e-9 * (1.0 + 16.0 * 0.03f64.powi(3));
+        assert!((delay_m - expected_m).abs() < 1e-12);
+    }
+
+    #[test]
+    fn zenith_troposphere_at_sea_level() {
+        // Dry 0.0022768 * 1013.25 at 45 degrees; wet of 11.9 hPa vapour at 15 C: 0.12 m.
+        let delay_m = saastamoinen_delay_m(&Geodetic::from_degrees(45.0, 0.0, 0.0), PI / 2.0);
+        assert!((delay_m - 2.307 - 0.120).abs() < 2e-3, "{delay_m}");
+    }
+
+    #[test]
+    fn outside_their_range_the_models_are_zero() {
+        let deep = Geodetic::from_degrees(0.0, 0.0, -6_378_137.0);
+        let high = Geodetic::from_degrees(0.0, 0.0, 57_447.0);
+        assert_eq!(saastamoinen_delay_m(&deep, 1.0), 0.0);
+        assert_eq!(saastamoinen_delay_m(&high, 1.0), 0.0);
+        assert_eq!(
+            saastamoinen_delay_m(&Geodetic::from_degrees(0.0, 0.0, 0.0), -0.1),
+            0.0
+        );
+        let noon = GpsTime::new(0, 50_400.0);
+        assert_eq!(BRAUNSCHWEIG.delay_m(&deep, &look(0.0, 1.0), noon), 0.0);
+        assert!(BRAUNSCHWEIG.delay_m(&high, &look(0.0, 1.0), noon) > 1.0);
+    }
+
+    proptest! {
+        #[test]
+        fn delays_are_finite_and_positive_above_the_horizontal(
+            lat in -1.571..1.571f64, lon in -3.15..3.15f64, height in -999.0..19_999.0f64,
+            azimuth in 0.0..6.3f64, elevation in 1e-9..1.57f64, tow in 0.0..604_800.0f64,
+        ) {
+            let here = Geodetic { lat_rad: lat, lon_rad: lon, height_m: height };
+            let time = GpsTime::new(2200, tow);
+            let ionosphere = BRAUNSCHWEIG.delay_m(&here, &look(azimuth, elevation), time);
+            let troposphere = saastamoinen_delay_m(&here, elevation);
+            // 5 ns is the least; 11 times (20 + 80) ns are more than any parameters here give.
+            prop_assert!((1.4..400.0).contains(&ionosphere));
+            prop_assert!(troposphere > 0.0 && troposphere.is_finite());
+        }
+    }
+}

@@ -3,6 +3,8 @@
 mod clock;
 mod orbit;
 mod store;
+#[cfg(test)]
+mod tests;
 
 use nalgebra::Vector3;
 
