@@ -9,13 +9,16 @@ use super::{
     InstructionSet,
     carrier_table::{CarrierTable, TableAmplitude},
     code_bits::CodeBits,
-    fixed_point::{Baseband, CODE_PERIOD, Interval, Kernel},
+    fixed_point::{BLOCK_SAMPLES, Baseband, CODE_PERIOD, Interval, Kernel},
     lane_table::{LaneTable, LaneTables},
 };
 use crate::{MAX_TAPS, SignalError};
 
 /// Samples of one vector of bytes.
 const LANES: usize = 32;
+
+/// Vectors of a block.
+const VECTORS: usize = BLOCK_SAMPLES / LANES;
 
 /// Below this half a vector may span more chips than one table look-up reaches.
 pub(super) const LOWEST_SAMPLE_RATE_HZ: f64 = 1.8e6;
@@ -26,7 +29,7 @@ type Sums = [__m256; 2];
 /// Fixed-point kernel for AVX2.
 #[derive(Debug)]
 pub(super) struct Avx2 {
-    lanes: LaneTables<LANES>,
+    lanes: LaneTables,
     baseband: Baseband,
     phases: [u64; MAX_TAPS],
     sums: [Sums; MAX_TAPS],
@@ -45,11 +48,12 @@ impl Avx2 {
         }
         // `vpacksswb` takes eight samples of the first half, then eight of the second, in turn.
         let order = std::array::from_fn(|byte| {
-            let (quarter, half, sample) = (byte / 16, byte / 8 % 2, byte % 8);
-            (16 * half + 8 * quarter + sample) as u8
+            let (vector, quarter) = (byte / 32, byte / 16 % 2);
+            let (half, sample) = (byte / 8 % 2, byte % 8);
+            (32 * vector + 16 * half + 8 * quarter + sample) as u8
         });
         // `vpshufb` looks up within 16 bytes: each half of a vector has its own window.
-        let origin = std::array::from_fn(|byte| (8 * (byte / 16)) as u8);
+        let origin = std::array::from_fn(|byte| (byte / 32 * 32 + byte / 16 % 2 * 8) as u8);
         // SAFETY: all bits zero are floats, and the instruction set is there.
         let zero = unsafe { [_mm256_setzero_ps(); 2] };
         Ok(Self {
@@ -155,10 +159,10 @@ fn add(
     };
     let chunk = Chunk {
         baseband,
-        blocks: samples.len() / interval.components() / LANES,
+        blocks: samples.len() / interval.components() / BLOCK_SAMPLES,
         code: interval.code,
         lanes,
-        step: interval.code_step(LANES),
+        step: interval.code_step(BLOCK_SAMPLES),
         turn,
     };
     let taps = interval.taps;
@@ -191,7 +195,7 @@ struct Chunk<'a> {
     baseband: &'a Baseband,
     blocks: usize,
     code: &'a CodeBits,
-    lanes: &'a LaneTable<LANES>,
+    lanes: &'a LaneTable,
     step: u64,
     turn: Complex64,
 }
@@ -205,18 +209,24 @@ fn add_taps<const TAPS: usize>(
     let mut in_phase = [_mm256_setzero_si256(); TAPS];
     let mut quadrature = [_mm256_setzero_si256(); TAPS];
     let mut now = *phases;
-    let second_window = chunk.lanes.origin_chips(LANES / 2) & 31;
-    let (i_blocks, _) = chunk.baseband.i.as_chunks::<LANES>();
-    let (q_blocks, _) = chunk.baseband.q.as_chunks::<LANES>();
+    let origin = |byte: usize| chunk.lanes.origin_chips(byte) & 127;
+    let origins: [[usize; 2]; VECTORS] =
+        std::array::from_fn(|vector| [0, LANES / 2].map(|half| origin(vector * LANES + half)));
+    let (i_blocks, _) = chunk.baseband.i.as_chunks::<BLOCK_SAMPLES>();
+    let (q_blocks, _) = chunk.baseband.q.as_chunks::<BLOCK_SAMPLES>();
     for (i, q) in i_blocks.iter().zip(q_blocks).take(chunk.blocks) {
-        let (i, q) = (load(i), load(q));
+        let (i, q) = (vectors(i), vectors(q));
         for tap in 0..TAPS {
             let phase = now[tap];
             let chip = (phase >> 32) as usize & 1023;
-            let windows = windows(chunk.code, chip, chip + second_window);
-            let code = _mm256_shuffle_epi8(windows, load(chunk.lanes.row(phase as u32)));
-            in_phase[tap] = _mm256_add_epi16(in_phase[tap], _mm256_maddubs_epi16(code, i));
-            quadrature[tap] = _mm256_add_epi16(quadrature[tap], _mm256_maddubs_epi16(code, q));
+            let row = chunk.lanes.row(phase as u32).as_chunks::<LANES>().0;
+            for (vector, (&i, &q)) in i.iter().zip(&q).enumerate() {
+                let [first, second] = origins[vector];
+                let windows = windows(chunk.code, chip + first, chip + second);
+                let code = _mm256_shuffle_epi8(windows, load(&row[vector]));
+                in_phase[tap] = _mm256_add_epi16(in_phase[tap], _mm256_maddubs_epi16(code, i));
+                quadrature[tap] = _mm256_add_epi16(quadrature[tap], _mm256_maddubs_epi16(code, q));
+            }
             let next = phase + chunk.step;
             now[tap] = next.min(next.wrapping_sub(CODE_PERIOD));
         }
@@ -227,17 +237,25 @@ fn add_taps<const TAPS: usize>(
     }
 }
 
-/// 16 chips of the code from `first` on and 16 from `second` on (each at most 1023 + 31).
+/// 16 chips of the code from `first` on and 16 from `second` on (each at most 1023 + 127).
 #[inline]
 #[target_feature(enable = "avx2,fma")]
 fn windows(code: &CodeBits, first: usize, second: usize) -> __m256i {
-    const { assert!(size_of::<CodeBits>() >= 1023 + 31 + 16) };
+    const { assert!(size_of::<CodeBits>() >= 1023 + 127 + 16) };
     // SAFETY: both windows lie within `CodeBits`, and the loads ask for no alignment.
     unsafe {
         let first = _mm_loadu_si128(code.as_ptr().add(first).cast());
         let second = _mm_loadu_si128(code.as_ptr().add(second).cast());
         _mm256_set_m128i(second, first)
     }
+}
+
+/// The vectors of a block.
+#[inline]
+#[target_feature(enable = "avx2,fma")]
+fn vectors(block: &[i8; BLOCK_SAMPLES]) -> [__m256i; VECTORS] {
+    let (vectors, _) = block.as_chunks::<LANES>();
+    std::array::from_fn(|vector| load(&vectors[vector]))
 }
 
 #[inline]

@@ -9,7 +9,7 @@ use super::{
     InstructionSet,
     carrier_table::{CarrierTable, TableAmplitude},
     code_bits::CodeBits,
-    fixed_point::{Baseband, CODE_PERIOD, Interval, Kernel},
+    fixed_point::{BLOCK_SAMPLES, Baseband, CODE_PERIOD, Interval, Kernel},
     lane_table::{LaneTable, LaneTables},
 };
 use crate::{MAX_TAPS, SignalError};
@@ -17,8 +17,11 @@ use crate::{MAX_TAPS, SignalError};
 /// Samples of one vector of bytes.
 const LANES: usize = 64;
 
+/// Vectors of a block.
+const VECTORS: usize = BLOCK_SAMPLES / LANES;
+
 /// Below this 64 samples may span more chips than one table look-up reaches.
-pub(super) const LOWEST_SAMPLE_RATE_HZ: f64 = 1.1e6;
+pub(super) const LOWEST_SAMPLE_RATE_HZ: f64 = 1.15e6;
 
 /// In-phase and quadrature sums by lane.
 type Sums = [__m512; 2];
@@ -26,7 +29,7 @@ type Sums = [__m512; 2];
 /// Fixed-point kernel for AVX-512.
 #[derive(Debug)]
 pub(super) struct Avx512 {
-    lanes: LaneTables<LANES>,
+    lanes: LaneTables,
     baseband: Baseband,
     phases: [u64; MAX_TAPS],
     sums: [Sums; MAX_TAPS],
@@ -49,13 +52,15 @@ impl Avx512 {
         }
         // `vpacksswb` takes eight samples of the first half, then eight of the second, in turn.
         let order = std::array::from_fn(|byte| {
-            let (quarter, half, sample) = (byte / 16, byte / 8 % 2, byte % 8);
-            (32 * half + 8 * quarter + sample) as u8
+            let (vector, quarter) = (byte / 64, byte / 16 % 4);
+            let (half, sample) = (byte / 8 % 2, byte % 8);
+            (64 * vector + 32 * half + 8 * quarter + sample) as u8
         });
+        let origin = std::array::from_fn(|byte| (byte / 64 * 64) as u8);
         // SAFETY: all bits zero are floats, and the instruction set is there.
         let zero = unsafe { [_mm512_setzero_ps(); 2] };
         Ok(Self {
-            lanes: LaneTables::new(order, [0; LANES]),
+            lanes: LaneTables::new(order, origin),
             baseband: Baseband::zeroed(),
             phases: [0; MAX_TAPS],
             sums: [zero; MAX_TAPS],
@@ -149,10 +154,10 @@ fn add(
     };
     let chunk = Chunk {
         baseband,
-        blocks: samples.len() / interval.components() / LANES,
+        blocks: samples.len() / interval.components() / BLOCK_SAMPLES,
         code: interval.code,
         lanes,
-        step: interval.code_step(LANES),
+        step: interval.code_step(BLOCK_SAMPLES),
         turn,
     };
     let taps = interval.taps;
@@ -185,7 +190,7 @@ struct Chunk<'a> {
     baseband: &'a Baseband,
     blocks: usize,
     code: &'a CodeBits,
-    lanes: &'a LaneTable<LANES>,
+    lanes: &'a LaneTable,
     step: u64,
     turn: Complex64,
 }
@@ -199,17 +204,22 @@ fn add_taps<const TAPS: usize>(
     let mut in_phase = [_mm512_setzero_si512(); TAPS];
     let mut quadrature = [_mm512_setzero_si512(); TAPS];
     let mut now = *phases;
-    let (i_blocks, _) = chunk.baseband.i.as_chunks::<LANES>();
-    let (q_blocks, _) = chunk.baseband.q.as_chunks::<LANES>();
+    let origins: [usize; VECTORS] =
+        std::array::from_fn(|vector| chunk.lanes.origin_chips(vector * LANES) & 127);
+    let (i_blocks, _) = chunk.baseband.i.as_chunks::<BLOCK_SAMPLES>();
+    let (q_blocks, _) = chunk.baseband.q.as_chunks::<BLOCK_SAMPLES>();
     for (i, q) in i_blocks.iter().zip(q_blocks).take(chunk.blocks) {
-        let (i, q) = (load(i), load(q));
+        let (i, q) = (vectors(i), vectors(q));
         for tap in 0..TAPS {
             let phase = now[tap];
             let chip = (phase >> 32) as usize & 1023;
-            let window = load(window(chunk.code, chip));
-            let code = _mm512_permutexvar_epi8(load(chunk.lanes.row(phase as u32)), window);
-            in_phase[tap] = _mm512_dpbusd_epi32(in_phase[tap], code, i);
-            quadrature[tap] = _mm512_dpbusd_epi32(quadrature[tap], code, q);
+            let row = chunk.lanes.row(phase as u32).as_chunks::<LANES>().0;
+            for (vector, (&i, &q)) in i.iter().zip(&q).enumerate() {
+                let window = load(window(chunk.code, chip + origins[vector]));
+                let code = _mm512_permutexvar_epi8(load(&row[vector]), window);
+                in_phase[tap] = _mm512_dpbusd_epi32(in_phase[tap], code, i);
+                quadrature[tap] = _mm512_dpbusd_epi32(quadrature[tap], code, q);
+            }
             let next = phase + chunk.step;
             now[tap] = next.min(next.wrapping_sub(CODE_PERIOD));
         }
@@ -220,11 +230,20 @@ fn add_taps<const TAPS: usize>(
     }
 }
 
-/// The code from `chip` (at most 1023) on.
+/// The code from `chip` (at most 1023 + 127) on.
 #[inline(always)]
 fn window(code: &CodeBits, chip: usize) -> &[u8; LANES] {
-    // SAFETY: `CodeBits` holds 1024 chips and a window, and all bytes are aligned.
+    const { assert!(size_of::<CodeBits>() >= 1023 + 127 + LANES) };
+    // SAFETY: the window lies within `CodeBits`, and bytes are always aligned.
     unsafe { &*code.as_ptr().add(chip).cast() }
+}
+
+/// The vectors of a block.
+#[inline]
+#[target_feature(enable = "avx512f")]
+fn vectors(block: &[i8; BLOCK_SAMPLES]) -> [__m512i; VECTORS] {
+    let (vectors, _) = block.as_chunks::<LANES>();
+    std::array::from_fn(|vector| load(&vectors[vector]))
 }
 
 #[inline]

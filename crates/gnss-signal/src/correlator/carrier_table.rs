@@ -94,7 +94,11 @@ fn dither(n: usize, seed: u32) -> f32 {
     let scattered = (n as u32 % 64 + 64 * (n as u32 / 128) + 1).wrapping_mul(seed);
     let scattered = (scattered ^ scattered >> 15).wrapping_mul(0x2c1b_3c6d);
     let level = (scattered >> 8) as f32 / 16_777_216.0 - 0.5;
-    if n / 64 % 2 == 0 { level } else { -level }
+    if (n / 64).is_multiple_of(2) {
+        level
+    } else {
+        -level
+    }
 }
 
 #[cfg(test)]

@@ -4,12 +4,12 @@ use std::sync::LazyLock;
 
 use crate::{CA_CODE_LENGTH_CHIPS, Signal, SignalId, ranging_code};
 
-/// Most chips a vector kernel reads in one piece.
-pub(super) const WINDOW_CHIPS: usize = 64;
+/// Chips beyond a period that the vector kernels may read.
+pub(super) const AHEAD_CHIPS: usize = 192;
 
 /// A ranging code, 1 where the chip is +1 and 0 where it is -1, continued into the next period so
 /// that a window from any chip of the first is contiguous.
-pub(super) type CodeBits = [u8; CA_CODE_LENGTH_CHIPS + 1 + WINDOW_CHIPS];
+pub(super) type CodeBits = [u8; CA_CODE_LENGTH_CHIPS + 1 + AHEAD_CHIPS];
 
 static CA_CODE_BITS: LazyLock<Vec<CodeBits>> = LazyLock::new(|| {
     let spec = Signal::GpsL1Ca.spec();

@@ -14,8 +14,8 @@ use super::{
 };
 use crate::{CA_CODE_LENGTH_CHIPS, FrontEnd, MAX_TAPS, Replica, SignalError};
 
-/// Samples a chunk is a multiple of: the widest vector.
-pub(super) const BLOCK_SAMPLES: usize = 64;
+/// Samples a chunk is a multiple of, and for which the vector kernels look up the code at a time.
+pub(super) const BLOCK_SAMPLES: usize = 128;
 
 /// One chip in fixed point.
 const ONE_CHIP: f64 = 4_294_967_296.0;
@@ -95,7 +95,7 @@ impl<'a> Interval<'a> {
     fn chunk_samples(&self) -> usize {
         let count = self.samples.len() / self.components();
         (count / 8)
-            .next_multiple_of(2 * BLOCK_SAMPLES)
+            .next_multiple_of(BLOCK_SAMPLES)
             .clamp(256, CHUNK_SAMPLES)
     }
 
@@ -125,7 +125,13 @@ fn levels(sample_power: f64, complex: bool) -> (i32, TableAmplitude) {
 
 /// `phase_chips` within the code period, 32.32 bits.
 fn fixed_phase(phase_chips: f64) -> u64 {
-    let wrapped = phase_chips.rem_euclid(CA_CODE_LENGTH_CHIPS as f64);
+    let period_chips = CA_CODE_LENGTH_CHIPS as f64;
+    // The remainder of a division takes as long as 500 samples, and is rarely needed.
+    let wrapped = if (0.0..period_chips).contains(&phase_chips) {
+        phase_chips
+    } else {
+        phase_chips.rem_euclid(period_chips)
+    };
     (wrapped * ONE_CHIP) as u64 % CODE_PERIOD
 }
 

@@ -1,80 +1,89 @@
-//! Which chip each sample of a vector falls into.
+//! Which chip each sample of a block falls into.
 
-/// Step of the code steps for which a table is kept, chips a sample. Half of it over 64 samples is
-/// 2e-6 chips, 0.6 mm.
+use super::fixed_point::BLOCK_SAMPLES;
+
+/// Step of the code steps for which a table is kept, chips a sample. Half of it over a block is
+/// 4e-6 chips, 1.1 mm.
 const STEP_QUANTUM_CHIPS: f64 = 1.0 / 16_777_216.0;
 
 /// Tables kept: one for each satellite and its recent Doppler.
 const TABLES_KEPT: usize = 32;
 
-/// Entries of the first guess at a rank.
-const GUESSES: usize = 512;
+/// Cells of the fractional code phase.
+const CELLS: usize = 512;
 
-/// Chip numbers of the samples of a vector of `LANES`, counted from the chip of its first sample.
+/// Chip numbers of the samples of a block, counted from the chip of its first sample.
 ///
 /// Sample n lies floor(f + n step) chips on, where f is the fractional code phase of sample 0: the
 /// whole part of n step, plus one where f and the fraction of n step carry. As f grows the samples
-/// carry one after the other, in the order of those fractions: so there are only `LANES` + 1
-/// different rows of chip numbers, and the rank of f among the fractions selects one.
+/// carry one after the other, in the order of those fractions: so there are only
+/// [`BLOCK_SAMPLES`] + 1 different rows of chip numbers, and the rank of f among the fractions
+/// selects one.
 #[derive(Debug, Clone)]
-pub(super) struct LaneTable<const LANES: usize> {
-    rows: Box<[Row<LANES>; 128]>,
+pub(super) struct LaneTable {
+    rows: Box<[Row; BLOCK_SAMPLES + 1]>,
     /// Fractions of n step in falling order, then zeros.
-    falling: [u32; 128],
+    falling: [u32; 2 * BLOCK_SAMPLES],
+    cells: [Cell; CELLS],
     /// Chips counted from for each byte of a row.
-    origins: [u8; LANES],
-    /// By the high bits of 2^32 - 1 - f: a rank that is certainly reached.
-    guesses: [u8; GUESSES],
+    origins: [u8; BLOCK_SAMPLES],
 }
 
 #[derive(Debug, Clone, Copy)]
 #[repr(C, align(64))]
-struct Row<const LANES: usize>([u8; LANES]);
+struct Row([u8; BLOCK_SAMPLES]);
 
-impl<const LANES: usize> LaneTable<LANES> {
+/// What is known of the rank from the high bits of 2^32 - 1 - f.
+#[derive(Debug, Clone, Copy)]
+#[repr(C, align(8))]
+struct Cell {
+    /// The largest fraction that may or may not be passed, or 0.
+    fraction: u32,
+    /// Fractions certainly passed.
+    rank: u16,
+    /// Whether a second fraction lies in this cell.
+    crowded: bool,
+}
+
+impl LaneTable {
     /// The table for `step_chips` a sample (below 1), with byte k for the sample `order[k]` and its
     /// chip counted from the nominal chip of sample `origin[k]`.
-    fn new(step_chips: f64, order: &[u8; LANES], origin: &[u8; LANES]) -> Self {
+    fn new(step_chips: f64, order: &[u8; BLOCK_SAMPLES], origin: &[u8; BLOCK_SAMPLES]) -> Self {
         let fixed = |n: u8| (step_chips * f64::from(n) * 4_294_967_296.0).round() as u64;
-        let mut by_fraction: Vec<(u32, usize)> = (0..LANES)
+        let mut by_fraction: Vec<(u32, usize)> = (0..BLOCK_SAMPLES)
             .map(|lane| (fixed(order[lane]) as u32, lane))
             .collect();
         by_fraction.sort_unstable_by(|a, b| b.cmp(a));
         let mut row = Row(std::array::from_fn(|lane| {
             ((fixed(order[lane]) >> 32) - (fixed(origin[lane]) >> 32)) as u8
         }));
-        let mut rows = Box::new([row; 128]);
-        let mut falling = [0; 128];
+        let mut rows = Box::new([row; BLOCK_SAMPLES + 1]);
+        let mut falling = [0; 2 * BLOCK_SAMPLES];
         for (rank, &(fraction, lane)) in by_fraction.iter().enumerate() {
             falling[rank] = fraction;
             row.0[lane] += 1;
             rows[rank + 1] = row;
         }
-        let guesses = std::array::from_fn(|cell| {
-            let largest = (cell as u32 + 1).wrapping_mul(1 << 23).wrapping_sub(1);
-            falling
-                .iter()
-                .take_while(|&&fraction| fraction > largest)
-                .count() as u8
-        });
         Self {
             rows,
+            cells: std::array::from_fn(|cell| Cell::new(cell as u32, &falling)),
             falling,
             origins: origin.map(|n| (fixed(n) >> 32) as u8),
-            guesses,
         }
     }
 
     /// Chip numbers for the fractional code phase `fraction` (of 2^32) at the first sample.
     #[inline(always)]
-    pub(super) fn row(&self, fraction: u32) -> &[u8; LANES] {
+    pub(super) fn row(&self, fraction: u32) -> &[u8; BLOCK_SAMPLES] {
         let below = !fraction;
-        let mut rank = usize::from(self.guesses[(below >> 23) as usize]);
-        rank += usize::from(self.falling[rank & 127] > below);
-        while self.falling[rank & 127] > below {
-            rank += 1;
+        let cell = self.cells[(below >> 23) as usize];
+        let mut rank = usize::from(cell.rank) + usize::from(cell.fraction > below);
+        if cell.crowded {
+            while self.falling[rank % (2 * BLOCK_SAMPLES)] > below {
+                rank += 1;
+            }
         }
-        &self.rows[rank & 127].0
+        &self.rows[rank].0
     }
 
     /// From which chip, counted from that of sample 0, byte `byte` of a row counts.
@@ -83,18 +92,32 @@ impl<const LANES: usize> LaneTable<LANES> {
     }
 }
 
-/// The tables last used, the current one first.
-#[derive(Debug)]
-pub(super) struct LaneTables<const LANES: usize> {
-    order: [u8; LANES],
-    origin: [u8; LANES],
-    recent: Vec<(u64, LaneTable<LANES>)>,
+impl Cell {
+    fn new(number: u32, falling: &[u32]) -> Self {
+        let smallest = number << 23;
+        let largest = smallest | ((1 << 23) - 1);
+        let passed = |limit: u32| falling.iter().take_while(|&&f| f > limit).count();
+        let rank = passed(largest);
+        Self {
+            fraction: falling[rank],
+            rank: rank as u16,
+            crowded: passed(smallest) > rank + 1,
+        }
+    }
 }
 
-impl<const LANES: usize> LaneTables<LANES> {
-    /// Tables for a vector whose byte k belongs to sample `order[k]` and counts chips from sample
+/// The tables last used, the current one first.
+#[derive(Debug)]
+pub(super) struct LaneTables {
+    order: [u8; BLOCK_SAMPLES],
+    origin: [u8; BLOCK_SAMPLES],
+    recent: Vec<(u64, LaneTable)>,
+}
+
+impl LaneTables {
+    /// Tables for rows whose byte k belongs to sample `order[k]` and counts chips from sample
     /// `origin[k]`.
-    pub(super) fn new(order: [u8; LANES], origin: [u8; LANES]) -> Self {
+    pub(super) fn new(order: [u8; BLOCK_SAMPLES], origin: [u8; BLOCK_SAMPLES]) -> Self {
         Self {
             order,
             origin,
@@ -118,7 +141,7 @@ impl<const LANES: usize> LaneTables<LANES> {
     }
 
     /// The table last selected.
-    pub(super) fn current(&self) -> Option<&LaneTable<LANES>> {
+    pub(super) fn current(&self) -> Option<&LaneTable> {
         self.recent.first().map(|(_, table)| table)
     }
 }
@@ -129,8 +152,8 @@ mod tests {
 
     #[test]
     fn rows_count_the_chips_of_every_sample() {
-        let order: [u8; 64] = std::array::from_fn(|k| (k * 37 % 64) as u8);
-        let mut tables = LaneTables::new(order, [0; 64]);
+        let order = std::array::from_fn(|k| (k * 37 % BLOCK_SAMPLES) as u8);
+        let mut tables = LaneTables::new(order, [0; BLOCK_SAMPLES]);
         for step in [
             1.0 / 16.0,
             0.25,
@@ -154,7 +177,7 @@ mod tests {
 
     #[test]
     fn the_oldest_table_is_given_up() {
-        let mut tables = LaneTables::<64>::new(std::array::from_fn(|k| k as u8), [0; 64]);
+        let mut tables = LaneTables::new(std::array::from_fn(|k| k as u8), [0; BLOCK_SAMPLES]);
         for i in 0..100 {
             tables.select(0.1 + f64::from(i) * 1e-3);
         }

@@ -1,4 +1,5 @@
 //! Every instruction set against the reference.
+#![allow(clippy::print_stdout, reason = "measured figures, for the documentation")]
 
 use std::f64::consts::TAU;
 
@@ -118,7 +119,10 @@ fn noise_sums_agree_at_every_rate_and_resolution() {
                 let deviation = deviation(set, front_end, &samples, &replica);
                 // Rounding and dither of the baseband to 8 bits have an rms of up to 0.03; 0.1 is
                 // exceeded by one such (Rayleigh) deviation in 60 000.
-                assert!(deviation < 0.1, "{set} {rate_hz} {complex} {bits}: {deviation}");
+                assert!(
+                    deviation < 0.1,
+                    "{set} {rate_hz} {complex} {bits}: {deviation}"
+                );
                 squares += deviation * deviation;
                 cases += 1;
             }
