@@ -25,6 +25,10 @@ const EXCLUSIONS: usize = 2;
 /// Redundant satellites left after an exclusion: with one, chance alone finds a fit too often.
 const REDUNDANT_AFTER_EXCLUSION: usize = 2;
 
+/// With so many redundant satellites wrong milliseconds do not pass by chance: each of them would
+/// have to agree to tens of metres in hundreds of kilometres. The first fit that passes is taken.
+const UNMISTAKABLE: usize = 3;
+
 /// A fit this many uncertainties from the prior is not believed.
 const BELIEVED: f64 = 2.0;
 
@@ -34,7 +38,7 @@ struct Hypothesis {
     start: (Vector3<f64>, GpsTime),
 }
 
-/// The best fit over all hypotheses that passes the residual test, with the fewest exclusions.
+/// The best fit that passes the residual test, with the fewest exclusions.
 pub(super) fn search<'a>(
     channels: &[Channel<'a>],
     anchor: &Anchor,
@@ -43,26 +47,22 @@ pub(super) fn search<'a>(
 ) -> Result<Fit<'a>, NavError> {
     let hypotheses = hypotheses(channels, anchor)?;
     for exclusions in 0..=EXCLUSIONS {
-        let kept = channels.len().saturating_sub(exclusions);
-        if exclusions > 0 && kept < UNKNOWNS + REDUNDANT_AFTER_EXCLUSION {
+        let redundant = channels.len().saturating_sub(UNKNOWNS + exclusions);
+        if exclusions > 0 && redundant < REDUNDANT_AFTER_EXCLUSION {
             break;
         }
         // Without redundancy every hypothesis fits: only the one nearest the prior is tried.
-        let tried = if kept <= UNKNOWNS {
-            1
+        let tried = if redundant == 0 { 1 } else { hypotheses.len() };
+        let threshold = chi_square_threshold(redundant.max(1), false_alarm_probability)?;
+        let mut passed = hypotheses[..tried].iter().filter_map(|h| {
+            best_without(channels, h, exclusions, anchor, model)
+                .filter(|fit| fit.chi_square <= threshold)
+        });
+        let best = if redundant >= UNMISTAKABLE {
+            passed.next()
         } else {
-            hypotheses.len()
+            passed.min_by(|a, b| score(a, anchor).total_cmp(&score(b, anchor)))
         };
-        let threshold = chi_square_threshold(
-            kept.saturating_sub(UNKNOWNS).max(1),
-            false_alarm_probability,
-        )?;
-        let best = combinations(channels.len(), exclusions)
-            .iter()
-            .flat_map(|out| hypotheses[..tried].iter().map(move |h| (out, h)))
-            .filter_map(|(out, h)| fit(&ranged(channels, h, out), anchor, model, h.start).ok())
-            .filter(|fit| fit.chi_square <= threshold && is_near(fit, anchor))
-            .min_by(|a, b| score(a, anchor).total_cmp(&score(b, anchor)));
         if let Some(best) = best {
             return Ok(best);
         }
@@ -70,6 +70,24 @@ pub(super) fn search<'a>(
     Err(NavError::NoFit {
         satellites: channels.len(),
     })
+}
+
+/// The best fit near the prior of one hypothesis, over all ways to leave out `exclusions`.
+fn best_without<'a>(
+    channels: &[Channel<'a>],
+    hypothesis: &Hypothesis,
+    exclusions: usize,
+    anchor: &Anchor,
+    model: &MeasurementModel,
+) -> Option<Fit<'a>> {
+    combinations(channels.len(), exclusions)
+        .iter()
+        .filter_map(|out| {
+            let ranged = ranged(channels, hypothesis, out);
+            fit(&ranged, anchor, model, hypothesis.start).ok()
+        })
+        .filter(|fit| is_near(fit, anchor))
+        .min_by(|a, b| score(a, anchor).total_cmp(&score(b, anchor)))
 }
 
 fn score(fit: &Fit, anchor: &Anchor) -> f64 {
