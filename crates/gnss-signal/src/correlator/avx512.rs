@@ -20,9 +20,6 @@ const LANES: usize = 64;
 /// Vectors of a block.
 const VECTORS: usize = BLOCK_SAMPLES / LANES;
 
-/// Below this 64 samples may span more chips than one table look-up reaches.
-pub(super) const LOWEST_SAMPLE_RATE_HZ: f64 = 1.15e6;
-
 /// In-phase and quadrature sums by lane.
 type Sums = [__m512; 2];
 

@@ -4,8 +4,8 @@ use std::sync::LazyLock;
 
 use crate::{CA_CODE_LENGTH_CHIPS, Signal, SignalId, ranging_code};
 
-/// Chips beyond a period that the vector kernels may read.
-pub(super) const AHEAD_CHIPS: usize = 192;
+/// Chips beyond a period that the kernels may read.
+pub(super) const AHEAD_CHIPS: usize = 256;
 
 /// A ranging code, 1 where the chip is +1 and 0 where it is -1, continued into the next period so
 /// that a window from any chip of the first is contiguous.

@@ -17,6 +17,9 @@ use crate::{CA_CODE_LENGTH_CHIPS, FrontEnd, MAX_TAPS, Replica, SignalError};
 /// Samples a chunk is a multiple of, and for which the vector kernels look up the code at a time.
 pub(super) const BLOCK_SAMPLES: usize = 128;
 
+/// Below this 64 samples may span more than the 64 chips that one table look-up reaches.
+pub(super) const LOWEST_SAMPLE_RATE_HZ: f64 = 1.15e6;
+
 /// One chip in fixed point.
 const ONE_CHIP: f64 = 4_294_967_296.0;
 

@@ -46,8 +46,8 @@ enum Kernel {
 }
 
 impl Correlator {
-    /// A correlator for samples of `front_end` on `instruction_set`. Where the samples are too few
-    /// per chip for the vector instruction sets, the portable code is used instead.
+    /// A correlator for samples of `front_end` on `instruction_set`. Samples too few per
+    /// chip for it (below 1.8 MHz for AVX2, 1.15 MHz for all) are left to a slower one.
     ///
     /// # Errors
     /// [`SignalError::Parameter`] where the sample rate is not a number of at least 1 kHz, or this
@@ -60,20 +60,17 @@ impl Correlator {
                 expected: "1e3 to 1e9",
             });
         }
+        let sample_rate_hz = front_end.sample_rate_hz;
         let kernel = match instruction_set {
             InstructionSet::Reference => Kernel::Reference,
             InstructionSet::Portable => portable_kernel(),
             InstructionSet::Avx2 => Kernel::Avx2(FixedPoint::boxed(avx2::Avx2::new()?)),
             InstructionSet::Avx512 => Kernel::Avx512(FixedPoint::boxed(avx512::Avx512::new()?)),
         };
-        let kernel = match &kernel {
-            Kernel::Avx2(_) if front_end.sample_rate_hz < avx2::LOWEST_SAMPLE_RATE_HZ => {
-                portable_kernel()
-            }
-            Kernel::Avx512(_) if front_end.sample_rate_hz < avx512::LOWEST_SAMPLE_RATE_HZ => {
-                portable_kernel()
-            }
-            _ => kernel,
+        let kernel = match kernel {
+            _ if sample_rate_hz < fixed_point::LOWEST_SAMPLE_RATE_HZ => Kernel::Reference,
+            Kernel::Avx2(_) if sample_rate_hz < avx2::LOWEST_SAMPLE_RATE_HZ => portable_kernel(),
+            kernel => kernel,
         };
         Ok(Self { front_end, kernel })
     }

@@ -3,16 +3,18 @@
 use num_complex::Complex64;
 
 use super::{
-    carrier_table::{CHUNK_SAMPLES, CarrierTable},
-    fixed_point::{Baseband, CODE_PERIOD, Interval, Kernel},
+    carrier_table::CarrierTable,
+    code_bits::CodeBits,
+    fixed_point::{BLOCK_SAMPLES, Baseband, CODE_PERIOD, Interval, Kernel},
+    lane_table::{LaneTable, LaneTables},
 };
-use crate::{CA_CODE_LENGTH_CHIPS, MAX_TAPS};
+use crate::MAX_TAPS;
 
 /// Fixed-point kernel for any processor.
 #[derive(Debug)]
 pub(super) struct Portable {
+    lanes: LaneTables,
     baseband: Baseband,
-    code: [u8; CHUNK_SAMPLES],
     phases: [u64; MAX_TAPS],
     sums: [Complex64; MAX_TAPS],
     baseband_sum: Complex64,
@@ -21,8 +23,8 @@ pub(super) struct Portable {
 impl Default for Portable {
     fn default() -> Self {
         Self {
+            lanes: LaneTables::new(std::array::from_fn(|n| n as u8), [0; BLOCK_SAMPLES]),
             baseband: Baseband::zeroed(),
-            code: [0; CHUNK_SAMPLES],
             phases: [0; MAX_TAPS],
             sums: [Complex64::default(); MAX_TAPS],
             baseband_sum: Complex64::default(),
@@ -32,6 +34,7 @@ impl Default for Portable {
 
 impl Kernel for Portable {
     fn start(&mut self, interval: &Interval<'_>) {
+        self.lanes.select(interval.code_step_chips);
         self.phases = interval.phases;
         self.sums = [Complex64::default(); MAX_TAPS];
         self.baseband_sum = Complex64::default();
@@ -53,17 +56,25 @@ impl Kernel for Portable {
         let (i, q) = (&self.baseband.i[..len], &self.baseband.q[..len]);
         let total = |values: &[i8]| values.iter().map(|&v| i32::from(v)).sum::<i32>();
         self.baseband_sum += turn * Complex64::new(total(i).into(), total(q).into());
-        let code = &mut self.code[..len];
-        let step = interval.code_step(len);
+        let Some(lanes) = self.lanes.current() else {
+            return;
+        };
+        let step = interval.code_step(BLOCK_SAMPLES);
+        let blocks = || i.as_chunks().0.iter().zip(q.as_chunks().0);
         for (phase, sum) in self
             .phases
             .iter_mut()
             .zip(&mut self.sums)
             .take(interval.taps)
         {
-            fill_code(interval, *phase, code);
-            *sum += turn * Complex64::new(dot(code, i).into(), dot(code, q).into());
-            *phase = (*phase + step) % CODE_PERIOD;
+            let mut total = [0; 2];
+            for (i, q) in blocks() {
+                let code = code_of(interval.code, lanes, *phase);
+                total[0] += dot(&code, i);
+                total[1] += dot(&code, q);
+                *phase = (*phase + step) % CODE_PERIOD;
+            }
+            *sum += turn * Complex64::new(total[0].into(), total[1].into());
         }
     }
 
@@ -103,25 +114,24 @@ fn wipe_off_complex(samples: &[i8], shift: i32, carrier: &CarrierTable, out: &mu
     }
 }
 
-/// Code bits of consecutive samples, chip by chip.
-fn fill_code(interval: &Interval<'_>, phase: u64, out: &mut [u8]) {
-    let samples_per_chip = interval.code_step_chips.recip();
-    let mut chip = (phase >> 32) as usize;
-    let fraction_chips = (phase & u64::from(u32::MAX)) as f64 / 4_294_967_296.0;
-    let mut chips_ended = 1.0 - fraction_chips;
-    let mut start = 0;
-    while start < out.len() {
-        let end = ((chips_ended * samples_per_chip).ceil() as usize).min(out.len());
-        out[start..end].fill(interval.code[chip]);
-        start = end;
-        chips_ended += 1.0;
-        chip = (chip + 1) % CA_CODE_LENGTH_CHIPS;
+/// Code bits of a block that starts at `phase`, as masks.
+fn code_of(code: &CodeBits, lanes: &LaneTable, phase: u64) -> [i8; BLOCK_SAMPLES] {
+    let window = &code[(phase >> 32) as usize & 1023..];
+    let row = lanes.row(phase as u32);
+    let mut masks = [0; BLOCK_SAMPLES];
+    if let Some(window) = window.first_chunk::<256>() {
+        for (mask, &chip) in masks.iter_mut().zip(row) {
+            *mask = (window[usize::from(chip)] as i8).wrapping_neg();
+        }
     }
+    masks
 }
 
-fn dot(code: &[u8], values: &[i8]) -> i32 {
-    let products = code.iter().zip(values);
-    products
-        .map(|(&bit, &value)| i32::from(i16::from(bit) * i16::from(value)))
-        .sum()
+/// Sum of the values under a mask; of 128 values it fits 16 bits.
+fn dot(masks: &[i8; BLOCK_SAMPLES], values: &[i8; BLOCK_SAMPLES]) -> i32 {
+    let masked = masks
+        .iter()
+        .zip(values)
+        .map(|(mask, value)| i16::from(mask & value));
+    i32::from(masked.fold(0_i16, i16::wrapping_add))
 }

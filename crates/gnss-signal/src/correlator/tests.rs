@@ -1,5 +1,8 @@
 //! Every instruction set against the reference.
-#![allow(clippy::print_stdout, reason = "measured figures, for the documentation")]
+#![allow(
+    clippy::print_stdout,
+    reason = "measured figures, for the documentation"
+)]
 
 use std::f64::consts::TAU;
 
@@ -330,6 +333,21 @@ fn full_scale_samples_do_not_overflow() {
                 assert!(sum.norm() <= 1.01 * exact.as_slice()[0].norm() + 16_368.0);
             }
             assert!((fast.as_slice()[0] - exact.as_slice()[0]).norm() < 16_368.0);
+        }
+    }
+}
+
+#[test]
+fn rates_too_low_for_an_instruction_set_are_correlated_by_another() {
+    let mut rng = ChaCha8Rng::seed_from_u64(10);
+    for set in fast_sets() {
+        for rate_hz in [1e5, 1.03e6, 1.2e6, 1.81e6] {
+            let front_end = front_end(rate_hz, true);
+            let replica = random_replica(&mut rng, rate_hz, 4000, &[-0.5, 0.0, 0.5]);
+            let samples = noise(&mut rng, 8000, 8);
+            let deviation = deviation(set, front_end, &samples, &replica);
+            // As in `noise_sums_agree_at_every_rate_and_resolution`.
+            assert!(deviation < 0.1, "{set} {rate_hz}: {deviation}");
         }
     }
 }
