@@ -1,4 +1,5 @@
 //! Acquisition of the recordings of the data folder, judged by its independent reference.
+#![allow(clippy::unwrap_used, clippy::print_stdout)] // a test, which says when it is skipped
 
 use std::path::PathBuf;
 
@@ -117,7 +118,12 @@ fn reference(name: &str) -> Vec<(u8, f64, f64, f64)> {
         .map(|sat| {
             let phase = number(sat, "code_phase_chips_at_sample0");
             let prn = number(sat, "prn") as u8;
-            (prn, number(sat, "doppler_hz"), phase, number(sat, "cn0_dbhz"))
+            (
+                prn,
+                number(sat, "doppler_hz"),
+                phase,
+                number(sat, "cn0_dbhz"),
+            )
         })
         .collect()
 }
@@ -127,7 +133,11 @@ fn judge(name: &str, recording: &Recording) {
     let plan = default_search(recording.duration_ms());
     let report = recording.search_all(plan);
     let reference = reference(name);
-    let tolerance_hz = if recording.duration_ms() < 20 { 40.0 } else { 10.0 };
+    let tolerance_hz = if recording.duration_ms() < 20 {
+        40.0
+    } else {
+        10.0
+    };
     for (prn, _, _, cn0_dbhz) in &reference {
         let found = report.hits.iter().any(|hit| hit.signal.prn() == *prn);
         assert!(

@@ -18,7 +18,9 @@ pub(super) fn conjugated(signal: SignalId) -> Vec<Complex32> {
         .map(|chip| Complex64::new(f64::from(*chip), 0.0))
         .collect();
     let length = chips.len();
-    FftPlanner::new().plan_fft_forward(length).process(&mut chips);
+    FftPlanner::new()
+        .plan_fft_forward(length)
+        .process(&mut chips);
     let mut spectrum = vec![Complex32::default(); POINTS];
     let half = POINTS as i64 / 2;
     for line in 1 - half..half {

@@ -5,6 +5,9 @@ use crate::{FrontEnd, SearchRequest, SignalError};
 
 /// Widest Doppler range, either side of its centre, Hz: a shift of a fifth of the band.
 const MAX_HALF_WIDTH_HZ: f64 = 200e3;
+/// Independent cells in one of the fine grid, whose neighbours (a quarter chip, a quarter bin) are
+/// correlated: a little more than simulated noise shows, to keep the promise from the safe side.
+const INDEPENDENT_PART: f64 = 0.7;
 /// Part of the last block that samples may lack.
 const MISSING_PART: f64 = 0.05;
 
@@ -65,9 +68,10 @@ impl Grid {
         (quarter.div_euclid(per_line), quarter.rem_euclid(per_line))
     }
 
-    /// Cells of the fine grid for one code.
+    /// Independent cells of the fine grid for one code.
     pub(super) fn cells_per_code(&self) -> f64 {
-        (4 * self.half_bins + 1) as f64 * super::FINE_POINTS as f64
+        let cells = (4 * self.half_bins + 1) as f64 * super::FINE_POINTS as f64;
+        INDEPENDENT_PART * cells
     }
 
     /// Code periods covered.
@@ -92,14 +96,22 @@ fn check(request: &SearchRequest) -> Result<(), SignalError> {
         return refuse("coherent integration (code periods)", value, "1 to 20");
     }
     if !(1..=MAX_PERIODS).contains(&periods) {
-        return refuse("search length (code periods)", periods.to_string(), "1 to 500");
+        return refuse(
+            "search length (code periods)",
+            periods.to_string(),
+            "1 to 500",
+        );
     }
     if !(probability > 0.0 && probability < 1.0) {
         let value = probability.to_string();
         return refuse("false-alarm probability", value, "above 0 and below 1");
     }
     if !(0.0..=MAX_HALF_WIDTH_HZ).contains(&half_hz) {
-        return refuse("half Doppler range (Hz)", half_hz.to_string(), "0 to 200000");
+        return refuse(
+            "half Doppler range (Hz)",
+            half_hz.to_string(),
+            "0 to 200000",
+        );
     }
     if !centre_hz.abs().le(&MAX_HALF_WIDTH_HZ) {
         let expected = "-200000 to 200000";

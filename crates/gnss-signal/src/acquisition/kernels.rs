@@ -62,7 +62,10 @@ mod tests {
             .map(|k| Complex32::new((k as f32).sin(), (1.3 * k as f32).cos()))
             .collect();
         let b: Vec<Complex32> = a.iter().rev().map(|v| v * 3.7).collect();
-        let mut product = [vec![Complex32::default(); 77], vec![Complex32::default(); 77]];
+        let mut product = [
+            vec![Complex32::default(); 77],
+            vec![Complex32::default(); 77],
+        ];
         multiply(&a, &b, &mut product[0]);
         multiply_body(&a, &b, &mut product[1]);
         assert_eq!(product[0], product[1]);

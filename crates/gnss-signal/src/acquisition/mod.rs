@@ -22,6 +22,8 @@ mod kernels;
 mod refine;
 mod search;
 mod spectra;
+#[cfg(test)]
+mod tests;
 mod threshold;
 
 use std::collections::BTreeMap;

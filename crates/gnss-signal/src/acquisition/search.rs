@@ -120,6 +120,8 @@ impl Searcher {
         thresholds: Thresholds,
     ) -> Cell {
         let limit = 2 * spectra.grid().half_bins;
+        // Two standard deviations of the mean of a bin of noise.
+        let spread = 2.0 / (1023.0 * spectra.grid().blocks as f64).sqrt();
         let mut best = Cell {
             quarter: 2 * peak.bin,
             delay_samples: peak.point as f64,
@@ -129,7 +131,7 @@ impl Searcher {
         for quarter in quarters.filter(|quarter| quarter.abs() <= limit) {
             self.sum_powers(spectra, code, quarter, FINE_POINTS);
             let mean = summarise(quarter, &self.power).mean;
-            let clutter = thresholds.single * (mean / noise - 1.0).max(0.0);
+            let clutter = thresholds.single * (mean / noise - 1.0 - spread).max(0.0);
             for offset in 0..5 {
                 let point = (2 * peak.point + FINE_POINTS + offset - 2) % FINE_POINTS;
                 let statistic = f64::from(self.power[point]) / noise - clutter;
@@ -148,16 +150,14 @@ impl Searcher {
 
     /// Sums the correlation powers of all blocks in one Doppler bin over `points` code phases,
     /// each block shifted by its code Doppler to the code phases of the first sample.
-    fn sum_powers(
-        &mut self,
-        spectra: &Spectra,
-        code: &[Complex32],
-        quarter: i64,
-        points: usize,
-    ) {
+    fn sum_powers(&mut self, spectra: &Spectra, code: &[Complex32], quarter: i64, points: usize) {
         let grid = spectra.grid();
         let (lines, blocks) = spectra.shifted(quarter);
-        let transform = if points == POINTS { &self.coarse } else { &self.fine };
+        let transform = if points == POINTS {
+            &self.coarse
+        } else {
+            &self.fine
+        };
         let product = &mut self.product[..points];
         let power = &mut self.power[..points];
         power.fill(0.0);
