@@ -1,10 +1,15 @@
 //! GPS software receiver: samples in, positions and verdicts out.
 
+pub mod cli;
 pub mod config;
 pub mod cost;
 mod error;
+pub mod inspect;
+pub mod pipeline;
+pub mod progress;
 pub mod record;
 pub mod rinex_nav;
+pub mod samples;
 pub mod sigmf;
 pub mod sink;
 pub mod summary;

@@ -1,6 +1,7 @@
 //! What a run found, in the form of `summary.json`.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::fmt;
 
 use gnss_nav::geodesy::Geodetic;
 use serde::{Deserialize, Serialize};
@@ -164,6 +165,84 @@ pub struct Fault {
     /// When it was taken back, s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub readmitted_s: Option<f64>,
+}
+
+impl fmt::Display for Summary {
+    /// One line for each thing found; the reason for no fix comes last.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        line(f, "signal", &format!("{:.3} s", self.signal_s))?;
+        let strengths = self
+            .acquired
+            .iter()
+            .map(|s| format!("{} {:.0}", s.sat, s.cn0_dbhz));
+        line(f, "acquired", &strengths.collect::<Vec<_>>().join("  "))?;
+        let decoded = self
+            .ephemerides_decoded
+            .iter()
+            .map(|prn| format!("G{prn:02}"));
+        line(f, "ephemerides", &decoded.collect::<Vec<_>>().join(" "))?;
+        if let Some(first_s) = self.first_fix_s {
+            line(
+                f,
+                "fixes",
+                &format!("{}, the first at {first_s:.3} s", self.fixes),
+            )?;
+        }
+        if let Some(p) = &self.position {
+            let place = format!("{:.7}° {:.7}° {:.2} m", p.lat_deg, p.lon_deg, p.height_m);
+            line(f, "position", &place)?;
+        }
+        if let Some(v) = &self.velocity {
+            let velocity = format!("{:.3} {:.3} {:.3} m/s (ECEF)", v.vx_mps, v.vy_mps, v.vz_mps);
+            line(f, "velocity", &velocity)?;
+        }
+        if let Some(time) = &self.time {
+            line(
+                f,
+                "time",
+                &format!("GPS week {}, {:.6} s", time.week, time.tow_s),
+            )?;
+        }
+        if let Some(error) = &self.error {
+            line(f, "error", &error.to_string())?;
+        }
+        for fault in &self.faults {
+            line(
+                f,
+                "fault",
+                &format!(
+                    "{} at {:.2} s ({})",
+                    fault.sat, fault.alarm_s, fault.monitor
+                ),
+            )?;
+        }
+        line(
+            f,
+            "no fix",
+            self.no_fix_reason.as_deref().unwrap_or_default(),
+        )
+    }
+}
+
+impl fmt::Display for ErrorStatistics {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "horizontal {:.2} m rms, {:.2} m at most; vertical {:.2} m rms; available {:.1} %",
+            self.horizontal_rms_m,
+            self.horizontal_max_m,
+            self.vertical_rms_m,
+            100.0 * self.availability
+        )
+    }
+}
+
+/// A name and its value, or nothing where there is no value.
+fn line(f: &mut fmt::Formatter<'_>, name: &str, value: &str) -> fmt::Result {
+    if value.is_empty() {
+        return Ok(());
+    }
+    writeln!(f, "{name:<12}{value}")
 }
 
 /// Builds a [`Summary`] from the records of a run.

@@ -4,9 +4,13 @@ mod calendar;
 pub mod channels;
 pub mod events;
 pub mod file;
+pub mod kml;
 pub mod navigation;
+pub mod nmea;
 pub mod observations;
+pub mod outputs;
 pub mod pvt;
+pub mod report;
 mod rinex_header;
 #[cfg(test)]
 pub(crate) mod sample_records;

@@ -1,0 +1,166 @@
+//! `receiver acquire`.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::io::Write;
+
+use gnss_nav::SatelliteId;
+use gnss_signal::{
+    AcquisitionHit, CorrelatorBank, IfCorrelatorBank, InstructionSet, SearchRequest, SignalId,
+    default_search,
+};
+use serde_json::json;
+
+use super::print;
+use crate::ReceiverError;
+use crate::config::{AcquireConfig, AcquireOptions};
+use crate::record::Acquired;
+use crate::samples::{self, Source};
+use crate::summary::AcquiredSatellite;
+
+/// Signal used by the stages, ms: a short one for what is strong, a longer one for the rest.
+const STAGES_MS: [u32; 2] = [20, 60];
+/// Probability that noise alone yields any satellite in the whole command.
+const FALSE_ALARM_PROBABILITY: f64 = 1e-3;
+
+pub(super) fn acquire(options: &AcquireOptions, out: &mut dyn Write) -> Result<(), ReceiverError> {
+    let config = options.check()?;
+    let (source, _) = samples::open(&config.recording, true)?;
+    let found = search(source, &config).map_err(|error| match error {
+        ReceiverError::Signal(error) => samples::in_recording(&config.recording.input, error),
+        other => other,
+    })?;
+    let acquired: Vec<AcquiredSatellite> = found.hits.values().map(satellite).collect();
+    if config.json {
+        print(out, &format!("{}\n", json!({ "acquired": acquired })))
+    } else if acquired.is_empty() {
+        print(out, &nothing(&config, &found))
+    } else {
+        print(out, &table(&acquired, &found))
+    }
+}
+
+struct Found {
+    hits: BTreeMap<SignalId, AcquisitionHit>,
+    signal_ms: u32,
+    best_missed: Option<(SignalId, f64, f64)>,
+}
+
+fn search(source: Source, config: &AcquireConfig) -> Result<Found, ReceiverError> {
+    let stages = match config.integration_ms {
+        Some(ms) => vec![ms],
+        None => STAGES_MS.to_vec(),
+    };
+    let longest_ms = stages.iter().copied().max().unwrap_or(1);
+    let history_s = f64::from(longest_ms + 2) * 1e-3;
+    let mut bank = IfCorrelatorBank::new(source, history_s, InstructionSet::detect())?
+        .with_search_threads(config.threads);
+    let ticks_per_ms = bank.front_end().sample_rate_hz * 1e-3;
+    let mut missing: Vec<SignalId> = config
+        .prns
+        .iter()
+        .map(|prn| SignalId::gps_l1_ca(*prn))
+        .collect::<Result<_, _>>()?;
+    let mut found = Found {
+        hits: BTreeMap::new(),
+        signal_ms: 0,
+        best_missed: None,
+    };
+    for stage_ms in &stages {
+        let wanted = (f64::from(*stage_ms) * ticks_per_ms).ceil() as u64;
+        let held = bank.advance_to(wanted)?;
+        if held == 0 {
+            return Err(samples::empty(&config.recording.input));
+        }
+        // A last period that lacks a twentieth is taken for whole.
+        let available_ms = (held as f64 / ticks_per_ms + 0.05) as u32;
+        let used_ms = available_ms.min(*stage_ms);
+        if used_ms <= found.signal_ms || missing.is_empty() {
+            break;
+        }
+        let (coherent_periods, noncoherent_sums) = plan(used_ms);
+        let report = bank.search(&SearchRequest {
+            signals: missing.clone(),
+            start_tick: 0,
+            doppler_centre_hz: 0.0,
+            doppler_half_width_hz: config.doppler_max_hz,
+            coherent_periods,
+            noncoherent_sums,
+            false_alarm_probability: FALSE_ALARM_PROBABILITY / stages.len() as f64,
+        })?;
+        found.signal_ms = used_ms;
+        found.best_missed = report.best_missed.map(|(id, s)| (id, s, report.threshold));
+        missing.retain(|signal| report.hits.iter().all(|hit| hit.signal != *signal));
+        found
+            .hits
+            .extend(report.hits.into_iter().map(|hit| (hit.signal, hit)));
+    }
+    if found.signal_ms == 0 {
+        return Err(ReceiverError::Content {
+            path: config.recording.input.to_string().into(),
+            what: "less than 1 ms of samples: expected a code period at least".to_owned(),
+        });
+    }
+    Ok(found)
+}
+
+/// Coherent periods and non-coherent sums for so many milliseconds.
+fn plan(signal_ms: u32) -> (u32, u32) {
+    if signal_ms > 60 {
+        (4, signal_ms / 4)
+    } else {
+        default_search(signal_ms)
+    }
+}
+
+fn satellite(hit: &AcquisitionHit) -> AcquiredSatellite {
+    (&Acquired {
+        satellite: SatelliteId::gps(hit.signal.prn()),
+        doppler_hz: hit.doppler_hz,
+        code_phase_chips: hit.code_phase_chips,
+        statistic: hit.statistic,
+        cn0_dbhz: hit.cn0_dbhz,
+    })
+        .into()
+}
+
+fn table(acquired: &[AcquiredSatellite], found: &Found) -> String {
+    let mut text =
+        String::from("sat   Doppler (Hz)   code phase (chips)   C/N0 (dB-Hz)   statistic\n");
+    for s in acquired {
+        let _ = writeln!(
+            text,
+            "{:4}{:>14.1}{:>21.3}{:>15.1}{:>12.2}",
+            s.sat, s.doppler_hz, s.code_phase_chips, s.cn0_dbhz, s.statistic
+        );
+    }
+    let _ = writeln!(
+        text,
+        "{} satellites in {} ms of signal",
+        acquired.len(),
+        found.signal_ms
+    );
+    text
+}
+
+fn nothing(config: &AcquireConfig, found: &Found) -> String {
+    let samples = &config.recording.samples;
+    let closest = found
+        .best_missed
+        .map_or_else(String::new, |(signal, statistic, threshold)| {
+            format!("; closest was {signal} with {statistic:.2} of the {threshold:.2} needed")
+        });
+    format!(
+        "no satellite acquired: looked for {} satellites (PRN {} to {}) within +-{:.1} kHz in {} \
+         ms of {} samples at {:.6} MHz, intermediate frequency {:.6} MHz{closest}. Wrong format, \
+         sample rate or intermediate frequency?\n",
+        config.prns.len(),
+        config.prns.first().unwrap_or(&0),
+        config.prns.last().unwrap_or(&0),
+        config.doppler_max_hz / 1e3,
+        found.signal_ms,
+        samples.format,
+        samples.sample_rate_hz / 1e6,
+        samples.intermediate_frequency_hz / 1e6,
+    )
+}

@@ -1,0 +1,205 @@
+//! `report.html`: one self-contained page with drawings, made without any network.
+
+mod chart;
+mod page;
+mod series;
+mod sky;
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use gnss_nav::{Geodetic, SatelliteId};
+use nalgebra::Vector3;
+
+use super::file::OutputFile;
+use crate::ReceiverError;
+use crate::record::{
+    ChannelRecord, Event, EventKind, InnovationRecord, ObservationEpoch, PvtRecord, Record, Status,
+};
+use crate::summary::Summary;
+use crate::truth::SolutionError;
+use chart::Mark;
+use series::Series;
+
+/// Name of the file.
+pub const FILE_NAME: &str = "report.html";
+
+/// Most events marked in the charts; a page with more is not read.
+const MOST_MARKS: usize = 60;
+
+/// Collects what the page shows, in memory that does not grow with the length of the run.
+#[derive(Debug)]
+pub struct Report {
+    file: OutputFile,
+    title: String,
+    satellites: BTreeMap<SatelliteId, SatelliteHistory>,
+    marks: Vec<(f64, String)>,
+    origin: Option<(Geodetic, Vector3<f64>)>,
+    track: sky::Path<2>,
+    height_m: Series,
+    horizontal_error_m: Series,
+    vertical_error_m: Series,
+}
+
+#[derive(Debug, Default)]
+struct SatelliteHistory {
+    cn0_dbhz: Series,
+    innovation_m: Series,
+    threshold_m: Series,
+    sky: sky::Path<2>,
+}
+
+impl Report {
+    /// Opens the file in `directory`.
+    ///
+    /// # Errors
+    /// [`ReceiverError::File`].
+    pub fn create(directory: &Path, title: &str) -> Result<Self, ReceiverError> {
+        Ok(Self {
+            file: OutputFile::create(directory, FILE_NAME)?,
+            title: title.to_owned(),
+            satellites: BTreeMap::new(),
+            marks: Vec::new(),
+            origin: None,
+            track: sky::Path::default(),
+            height_m: Series::default(),
+            horizontal_error_m: Series::default(),
+            vertical_error_m: Series::default(),
+        })
+    }
+
+    /// Takes one record.
+    pub fn record(&mut self, record: &Record) {
+        match record {
+            Record::Channel(channel) => self.channel(channel),
+            Record::Observations(epoch) => self.observations(epoch),
+            Record::Pvt(pvt) => self.solution(pvt),
+            Record::Event(event) => self.event(event),
+            Record::Ephemeris(_) | Record::IonosphereUtc(_) | Record::Taps(_) => {}
+        }
+    }
+
+    /// Takes the error of one solution, after the run.
+    pub fn error(&mut self, error: &SolutionError) {
+        let p = &error.position_enu_m;
+        self.horizontal_error_m.push(error.time_s, p.x.hypot(p.y));
+        self.vertical_error_m.push(error.time_s, p.z);
+    }
+
+    /// Draws the page.
+    ///
+    /// # Errors
+    /// [`ReceiverError::File`].
+    pub fn finish(mut self, summary: &Summary) -> Result<(), ReceiverError> {
+        let text = page::page(&self, summary);
+        write!(self.file, "{text}")?;
+        self.file.commit()
+    }
+
+    fn channel(&mut self, channel: &ChannelRecord) {
+        let history = self.satellites.entry(channel.satellite).or_default();
+        history.cn0_dbhz.push(channel.time_s, channel.cn0_dbhz);
+        if let Some(InnovationRecord { value, sigma }) = channel.innovation_code_m {
+            history.innovation_m.push(channel.time_s, value);
+            history.threshold_m.push(channel.time_s, 3.0 * sigma);
+        }
+    }
+
+    fn observations(&mut self, epoch: &ObservationEpoch) {
+        for observation in &epoch.observations {
+            if let (Some(azimuth), Some(elevation)) =
+                (observation.azimuth_rad, observation.elevation_rad)
+            {
+                let history = self.satellites.entry(observation.satellite).or_default();
+                history.sky.push([azimuth, elevation]);
+            }
+        }
+    }
+
+    fn solution(&mut self, pvt: &PvtRecord) {
+        if pvt.status == Status::Unreliable {
+            return;
+        }
+        let place = Geodetic::from_ecef(&pvt.position_ecef_m);
+        let (origin, origin_ecef_m) = self.origin.get_or_insert((place, pvt.position_ecef_m));
+        let enu = origin.enu_from_ecef() * (pvt.position_ecef_m - *origin_ecef_m);
+        self.track.push([enu.x, enu.y]);
+        self.height_m.push(pvt.time_s, place.height_m);
+    }
+
+    fn event(&mut self, event: &Event) {
+        let what = match &event.kind {
+            EventKind::Excluded { .. } => "excluded",
+            EventKind::Readmitted => "readmitted",
+            EventKind::Discontinuity { .. } => "sample jump",
+            EventKind::FirstFix => "first fix",
+            EventKind::FixLost => "fix lost",
+            _ => return,
+        };
+        if self.marks.len() < MOST_MARKS {
+            let label = event.satellite.map_or_else(
+                || what.to_owned(),
+                |satellite| format!("{satellite} {what}"),
+            );
+            self.marks.push((event.time_s, label));
+        }
+    }
+
+    fn chart_marks(&self) -> Vec<Mark> {
+        self.marks
+            .iter()
+            .map(|(time_s, label)| Mark {
+                time_s: *time_s,
+                label: label.clone(),
+            })
+            .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::sample_records::{channel, observations, pvt};
+    use super::*;
+    use crate::summary::SummaryBuilder;
+
+    #[test]
+    fn the_page_is_self_contained_and_survives_hostile_text() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut report = Report::create(folder.path(), "<script>&").unwrap();
+        let mut builder = SummaryBuilder::default();
+        for i in 0..3 {
+            let time_s = f64::from(i);
+            let mut row = channel(time_s, 7);
+            row.innovation_code_m = Some(InnovationRecord {
+                value: f64::NAN,
+                sigma: 1.0,
+            });
+            for record in [
+                Record::Observations(observations(time_s)),
+                Record::Channel(row),
+                Record::Pvt(pvt(time_s)),
+            ] {
+                report.record(&record);
+                builder.record(&record);
+            }
+        }
+        report.finish(&builder.finish(3.0, None)).unwrap();
+        let text = std::fs::read_to_string(folder.path().join(FILE_NAME)).unwrap();
+        assert!(text.contains("&lt;script&gt;&amp;"));
+        for foreign in ["http://", "https://", "<script", "NaN"] {
+            assert!(!text.contains(foreign), "{foreign}");
+        }
+    }
+
+    #[test]
+    fn a_run_without_anything_still_has_a_page_that_says_why() {
+        let folder = tempfile::tempdir().unwrap();
+        let report = Report::create(folder.path(), "empty").unwrap();
+        let reason = Some("no satellite acquired".to_owned());
+        report
+            .finish(&SummaryBuilder::default().finish(1.0, reason))
+            .unwrap();
+        let text = std::fs::read_to_string(folder.path().join(FILE_NAME)).unwrap();
+        assert!(text.contains("no satellite acquired"));
+    }
+}
