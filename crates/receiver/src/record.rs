@@ -319,6 +319,8 @@ pub enum EventKind {
         /// How many channels saw it.
         channels: usize,
     },
+    /// The spectrum runs the other way: I and Q exchanged, or mixed from above.
+    SpectrumInverted,
     /// An ephemeris was decoded.
     EphemerisDecoded {
         /// Issue of data, ephemeris.

@@ -23,7 +23,18 @@ pub struct ChannelUpdate {
     /// A complete data bit.
     pub bit: Option<NavBit>,
     /// The bit boundaries were found: tracking restarts at the beginning of the stretch.
-    pub bit_sync: bool,
+    pub bit_sync: Option<BitSync>,
+}
+
+/// What a channel knows when it has found the bit boundaries.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BitSync {
+    /// Apparent Doppler, Hz.
+    pub doppler_hz: f64,
+    /// Code rate of the signal over the one that belongs to the Doppler, chips/s.
+    pub code_slip_hz: f64,
+    /// Its variance, (chips/s)^2.
+    pub code_slip_variance_hz2: f64,
 }
 
 /// Follows one signal with its own loops.
@@ -53,6 +64,8 @@ struct PullIn {
     stretch: Stretch,
 }
 
+/// Fewest periods of a stretch: two whole bits, whose code phases can be compared.
+const LEAST_PERIODS: usize = 60;
 /// Periods between two looks at the stretch.
 const LOOK_PERIODS: usize = 20;
 /// Periods before the power of a stretch is judged.
@@ -65,6 +78,7 @@ impl Channel {
         let mut start = Nco {
             signal: hit.signal,
             front_end,
+            spectrum: settings.spectrum,
             tick: hit.tick,
             code_period: 0,
             code_phase_chips: 0.0,
@@ -108,7 +122,7 @@ impl Channel {
         }
     }
 
-    /// Doppler of the replica, Hz; the last one where the signal is lost.
+    /// Apparent Doppler of the replica, Hz; the last one where the signal is lost.
     #[must_use]
     pub fn doppler_hz(&self) -> f64 {
         match &self.stage {
@@ -173,7 +187,7 @@ impl Channel {
                 }
                 ChannelUpdate {
                     bit,
-                    bit_sync: false,
+                    bit_sync: None,
                 }
             }
             Stage::Lost(..) => ChannelUpdate::default(),
@@ -186,7 +200,7 @@ impl Channel {
             return ChannelUpdate::default();
         };
         let periods = p.stretch.len();
-        if periods < 2 * LOOK_PERIODS || periods % LOOK_PERIODS != 0 {
+        if periods < LEAST_PERIODS || periods % LOOK_PERIODS != 0 {
             return ChannelUpdate::default();
         }
         let estimate = p.estimate(&self.settings);
@@ -194,10 +208,11 @@ impl Channel {
         match estimate {
             Some(found) if found.bit_edge.is_some() && found.cn0_hz > lowest => {
                 let steady = p.steady(&found, self.settings);
+                let sync = p.bit_sync(&found, self.settings.spacing_chips);
                 self.stage = Stage::Steady(Box::new(steady));
                 return ChannelUpdate {
                     bit: None,
-                    bit_sync: true,
+                    bit_sync: Some(sync),
                 };
             }
             Some(found) if found.cn0_hz > lowest => {
@@ -259,6 +274,27 @@ impl PullIn {
         Steady::new(nco, settings, found.cn0_hz, averaged_s)
     }
 
+    fn bit_sync(&self, found: &PullInEstimate, spacing_chips: f64) -> BitSync {
+        let spec = self.start.signal.spec();
+        let bit_s = f64::from(spec.code_periods_per_bit) * self.period_s();
+        let first_bits = found.whole_bits / 2;
+        let second_bits = found.whole_bits - first_bits;
+        // The halves' middles lie half the whole bits apart.
+        let apart_s = found.whole_bits as f64 * bit_s / 2.0;
+        let variance = |bits: usize| {
+            code_variance_chips2(found.cn0_hz, bits as f64 * bit_s, spacing_chips)
+        };
+        let fitted_hz = self.start.spectrum.sign() * found.doppler_offset_hz;
+        BitSync {
+            doppler_hz: self.start.doppler_hz + found.doppler_offset_hz,
+            code_slip_hz: found.code_drift_chips / apart_s
+                - fitted_hz * spec.code_rate_hz / spec.carrier_hz,
+            // Infinite without a bit in either half.
+            code_slip_variance_hz2: (variance(first_bits) + variance(second_bits))
+                / (apart_s * apart_s),
+        }
+    }
+
     /// Begins a new stretch here, at the Doppler and code phase found.
     fn restart(&mut self, found: &PullInEstimate) {
         let mut nco = self.corrected_start(found);
@@ -276,14 +312,12 @@ impl PullIn {
         let cn0_hz = found.cn0_hz.max(1.0);
         let length_s = self.stretch.len() as f64 * self.period_s();
         let spacing = settings.spacing_chips;
-        // Early minus late over the stretch (as a loop of bandwidth 1 / (2 T)), and the bound of
-        // a frequency from a stretch (Rife1974), doubled for the unknown data.
+        // The bound of a frequency from a stretch (Rife1974), doubled for the unknown data.
         let snr = cn0_hz * length_s;
-        let bit_snr = cn0_hz * length_s.min(20.0 * self.period_s());
-        let squaring = 1.0 + 2.0 / ((2.0 - spacing) * bit_snr);
         let tau = std::f64::consts::TAU;
         let last = self.stretch.last()?;
         let first = self.start.nearest_period();
+        let sign = nco.spectrum.sign();
         Some(ChannelEpoch {
             signal: nco.signal,
             tick,
@@ -292,10 +326,10 @@ impl PullIn {
             periods_into_bit: found
                 .bit_edge
                 .map(|edge| (nco.code_period - i64::from(edge) - first).rem_euclid(20) as u8),
-            code_variance_chips2: spacing / (4.0 * snr) * squaring,
-            doppler_hz: nco.doppler_hz,
+            code_variance_chips2: code_variance_chips2(cn0_hz, length_s, spacing),
+            doppler_hz: sign * nco.doppler_hz,
             doppler_variance_hz2: 12.0 / (tau * tau * snr * length_s * length_s),
-            doppler_cycles: nco.doppler_cycles,
+            doppler_cycles: sign * nco.doppler_cycles,
             phase_slipped: true,
             cn0_dbhz: cn0::dbhz(cn0_hz),
             lock: Lock::PullIn,
@@ -304,6 +338,13 @@ impl PullIn {
             frequency_error_hz: found.doppler_offset_hz,
         })
     }
+}
+
+/// Variance of early minus late over a stretch of `length_s`, bit by bit, chips^2.
+fn code_variance_chips2(cn0_hz: f64, length_s: f64, spacing_chips: f64) -> f64 {
+    let bit_snr = cn0_hz * length_s.min(0.02);
+    let squaring = 1.0 + 2.0 / ((2.0 - spacing_chips) * bit_snr);
+    spacing_chips / (4.0 * cn0_hz * length_s) * squaring
 }
 
 #[cfg(test)]
@@ -398,6 +439,32 @@ mod tests {
     /// Middle of the k-th whole bit of the ideal signal, s.
     fn bit_middle(k: usize) -> f64 {
         (20_460.0 - 5_000.3) / 1.023e6 + 0.02 * (k as f64 + 0.5)
+    }
+
+    #[test]
+    fn an_inverted_spectrum_shows_in_the_code() {
+        let mut signal = IdealSignal::new(50.0, 3);
+        signal.doppler_hz = -3_000.0;
+        let mut run = Run::new(&signal, 0.0, 10.0);
+        let mut inverted = signal.hit(0.0, 10.0);
+        inverted.doppler_hz = 2_990.0;
+        // The bank's signal, received upside down: its carrier turns the other way.
+        signal.mirrored = true;
+        run.channel = Channel::new(&inverted, signal.front_end, TrackingSettings::default());
+        let mut taps = Vec::new();
+        let sync = loop {
+            let replica = run.channel.replica().unwrap();
+            signal.correlate(&[replica], &mut taps).unwrap();
+            let update = run.channel.update(&replica, &taps[0], &run.noise);
+            if let Some(sync) = update.bit_sync {
+                break sync;
+            }
+        };
+        let expected = -2.0 * sync.doppler_hz / 1540.0;
+        // Four reported sigmas, and far from none.
+        let sigma = sync.code_slip_variance_hz2.sqrt();
+        assert!((sync.code_slip_hz - expected).abs() < 4.0 * sigma);
+        assert!(expected.abs() > 4.0 * sigma);
     }
 
     #[test]

@@ -20,7 +20,7 @@ pub struct ChannelEpoch {
     pub periods_into_bit: Option<u8>,
     /// Variance of the code phase, chips^2.
     pub code_variance_chips2: f64,
-    /// Doppler, Hz.
+    /// Doppler, Hz, above zero when approaching (whichever way the spectrum runs).
     pub doppler_hz: f64,
     /// Its variance, Hz^2.
     pub doppler_variance_hz2: f64,

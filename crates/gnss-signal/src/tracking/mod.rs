@@ -14,8 +14,8 @@ mod settings;
 mod simulated;
 mod steady;
 
-pub use channel::{Channel, ChannelUpdate, NavBit};
+pub use channel::{BitSync, Channel, ChannelUpdate, NavBit};
 pub use epoch::ChannelEpoch;
 pub use lock::Lock;
 pub use noise::NoiseFloor;
-pub use settings::TrackingSettings;
+pub use settings::{Spectrum, TrackingSettings};

@@ -1,5 +1,6 @@
 //! The code and carrier oscillators of a channel, on the sample clock.
 
+use super::Spectrum;
 use crate::{FrontEnd, Replica, SignalId, TapOffsets};
 
 /// State of both oscillators at a tick.
@@ -7,6 +8,7 @@ use crate::{FrontEnd, Replica, SignalId, TapOffsets};
 pub(super) struct Nco {
     pub(super) signal: SignalId,
     pub(super) front_end: FrontEnd,
+    pub(super) spectrum: Spectrum,
     /// Where the state holds.
     pub(super) tick: u64,
     /// Code periods completed since the channel's first began.
@@ -15,9 +17,9 @@ pub(super) struct Nco {
     pub(super) code_phase_chips: f64,
     /// Carrier phase as sampled, cycles, in [0, 1).
     pub(super) carrier_phase_cycles: f64,
-    /// Integral of the Doppler since the channel's start, cycles.
+    /// Integral of the apparent Doppler since the channel's start, cycles.
     pub(super) doppler_cycles: f64,
-    /// Doppler, Hz.
+    /// Apparent Doppler, Hz.
     pub(super) doppler_hz: f64,
 }
 
@@ -25,7 +27,7 @@ impl Nco {
     /// Code rate that belongs to the Doppler, chips/s.
     pub(super) fn code_rate_hz(&self) -> f64 {
         let spec = self.signal.spec();
-        spec.code_rate_hz * (1.0 + self.doppler_hz / spec.carrier_hz)
+        spec.code_rate_hz * (1.0 + self.spectrum.sign() * self.doppler_hz / spec.carrier_hz)
     }
 
     /// Chips in a code period.
@@ -95,6 +97,7 @@ mod tests {
                 intermediate_frequency_hz: 1.0e3,
                 complex: true,
             },
+            spectrum: Spectrum::Upright,
             tick: 100,
             code_period: 0,
             code_phase_chips,

@@ -34,6 +34,11 @@ pub(super) struct PullInEstimate {
     pub(super) doppler_offset_hz: f64,
     /// Code phase of the signal over that of the replica in the middle of the stretch, chips.
     pub(super) code_offset_chips: f64,
+    /// How much that grew from the first half of the whole bits to the second, chips; 0 with
+    /// fewer than two.
+    pub(super) code_drift_chips: f64,
+    /// Whole bits in the stretch.
+    pub(super) whole_bits: usize,
     /// First period that begins a bit, where it is certain.
     pub(super) bit_edge: Option<u32>,
     /// Phase of the signal over that of the replica in the middle of the first period, cycles
@@ -79,7 +84,9 @@ impl Stretch {
         let cn0_hz = blocks.signal_power(self.noise)? / self.noise / period_s;
         Some(PullInEstimate {
             doppler_offset_hz: offset_hz,
-            code_offset_chips: blocks.code_error_chips(self.noise, spacing_chips),
+            code_offset_chips: code_error_chips(&blocks.used, self.noise, spacing_chips),
+            code_drift_chips: blocks.code_drift_chips(self.noise, spacing_chips),
+            whole_bits: blocks.whole.len(),
             bit_edge: certain.then_some(edge as u32),
             phase_offset_cycles: blocks.phase_cycles(),
             cn0_hz,
@@ -247,23 +254,34 @@ impl Blocks {
         (power > 0.0).then(|| power / weight)
     }
 
-    /// Code error by the envelopes of early and late freed of their noise, chips.
-    fn code_error_chips(&self, noise: f64, spacing_chips: f64) -> f64 {
-        let envelope = |pick: fn(&EarlyPromptLate) -> Complex64| {
-            let power = self.used.iter().map(|(b, n)| pick(b).norm_sqr() - n * noise);
-            power.sum::<f64>().max(0.0).sqrt()
-        };
-        let (early, late) = (envelope(|b| b.early), envelope(|b| b.late));
-        if early + late > 0.0 {
-            (1.0 - spacing_chips / 2.0) * (early - late) / (early + late)
-        } else {
-            0.0
+    /// Growth of the code error from the first half of the whole bits to the second, chips.
+    fn code_drift_chips(&self, noise: f64, spacing_chips: f64) -> f64 {
+        let whole: Vec<_> = self.whole.iter().map(|b| (*b, BIT as f64)).collect();
+        let (first, second) = whole.split_at(whole.len() / 2);
+        if first.is_empty() {
+            return 0.0;
         }
+        code_error_chips(second, noise, spacing_chips)
+            - code_error_chips(first, noise, spacing_chips)
     }
 
     /// Phase of the signal over the replica, turned back to the first period, cycles.
     fn phase_cycles(&self) -> f64 {
         self.used.first().map_or(0.0, |(b, _)| b.prompt.arg() / TAU)
+    }
+}
+
+/// Code error by the envelopes of early and late freed of their noise, chips.
+fn code_error_chips(blocks: &[(EarlyPromptLate, f64)], noise: f64, spacing_chips: f64) -> f64 {
+    let envelope = |pick: fn(&EarlyPromptLate) -> Complex64| {
+        let power = blocks.iter().map(|(b, n)| pick(b).norm_sqr() - n * noise);
+        power.sum::<f64>().max(0.0).sqrt()
+    };
+    let (early, late) = (envelope(|b| b.early), envelope(|b| b.late));
+    if early + late > 0.0 {
+        (1.0 - spacing_chips / 2.0) * (early - late) / (early + late)
+    } else {
+        0.0
     }
 }
 

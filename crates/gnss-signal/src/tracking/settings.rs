@@ -4,9 +4,31 @@ use super::discriminator::CodeDiscriminator;
 use super::loop_filter::{CarrierBandwidth, LoopOrder};
 use crate::SignalError;
 
+/// Which way the front end maps the spectrum.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Spectrum {
+    /// An approaching satellite appears at a higher frequency.
+    Upright,
+    /// It appears at a lower one: mixed from above, or I and Q exchanged.
+    Inverted,
+}
+
+impl Spectrum {
+    /// Factor from apparent to physical Doppler.
+    #[must_use]
+    pub const fn sign(self) -> f64 {
+        match self {
+            Self::Upright => 1.0,
+            Self::Inverted => -1.0,
+        }
+    }
+}
+
 /// Settings of scalar tracking.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TrackingSettings {
+    /// Which way the front end maps the spectrum. Default: upright.
+    pub spectrum: Spectrum,
     /// Coherent integration after bit synchronisation, code periods (1, 2, 4, 5, 10 or 20).
     ///
     /// Default 10: two sums in a bit, so that the frequency discriminator never meets a bit edge,
@@ -39,6 +61,7 @@ pub struct TrackingSettings {
 impl Default for TrackingSettings {
     fn default() -> Self {
         Self {
+            spectrum: Spectrum::Upright,
             integration_periods: 10,
             spacing_chips: 0.5,
             code_discriminator: CodeDiscriminator::Envelope,

@@ -25,6 +25,8 @@ pub(super) struct IdealSignal {
     pub(super) doppler_rate_hz_s: f64,
     /// The signal is absent from here on.
     pub(super) ends_s: f64,
+    /// The carrier appears upside down.
+    pub(super) mirrored: bool,
     pub(super) rng: ChaCha8Rng,
 }
 
@@ -42,6 +44,7 @@ impl IdealSignal {
             doppler_hz: 1_234.5,
             doppler_rate_hz_s: 0.5,
             ends_s: f64::INFINITY,
+            mirrored: false,
             rng: ChaCha8Rng::seed_from_u64(seed),
         }
     }
@@ -84,9 +87,10 @@ impl IdealSignal {
         let error = (self.chips_at(middle) - code + 511.5).rem_euclid(1023.0) - 511.5;
         let replica_phase =
             replica.carrier_phase_cycles + replica.carrier_frequency_hz * length / 2.0;
-        let phase = TAU * (self.cycles_at(middle) - replica_phase);
-        let x = PI * length
-            * (self.doppler_hz + self.doppler_rate_hz_s * middle - replica.carrier_frequency_hz);
+        let sign = if self.mirrored { -1.0 } else { 1.0 };
+        let phase = TAU * (sign * self.cycles_at(middle) - replica_phase);
+        let doppler_hz = sign * (self.doppler_hz + self.doppler_rate_hz_s * middle);
+        let x = PI * length * (doppler_hz - replica.carrier_frequency_hz);
         let sinc = if x == 0.0 { 1.0 } else { x.sin() / x };
         let present = replica.signal == self.signal && middle < self.ends_s;
         let snr = if present { cn0::ratio_hz(self.cn0_dbhz) * length } else { 0.0 };

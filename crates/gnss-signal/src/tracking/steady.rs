@@ -202,6 +202,7 @@ impl Steady {
         at.advance_to(tick);
         let (code_error_chips, frequency_error_hz) = self.pre_filter.mean_errors();
         let (doppler_hz, doppler_variance_hz2) = self.doppler(tick, frequency_error_hz);
+        let sign = at.spectrum.sign();
         let epoch = ChannelEpoch {
             signal: at.signal,
             tick,
@@ -211,9 +212,9 @@ impl Steady {
                 (at.code_period - self.bit_edge).rem_euclid(bit_periods(&at)) as u8
             ),
             code_variance_chips2: self.code_variance_chips2(),
-            doppler_hz,
+            doppler_hz: sign * doppler_hz,
             doppler_variance_hz2,
-            doppler_cycles: at.doppler_cycles,
+            doppler_cycles: sign * at.doppler_cycles,
             phase_slipped: std::mem::replace(&mut self.slipped, self.lock != Lock::Carrier),
             cn0_dbhz: cn0::dbhz(self.cn0_hz),
             lock: self.lock,

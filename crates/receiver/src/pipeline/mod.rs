@@ -13,6 +13,7 @@ mod run;
 mod schedule;
 mod settings;
 mod slot;
+mod spectrum;
 
 pub use outcome::Outcome;
 pub use run::run;

@@ -39,8 +39,6 @@ pub(super) struct Navigated {
     pub(super) receive_time: Option<GpsTime>,
     /// The measurements, where the clock is good enough.
     pub(super) raw: Vec<RawMeasurement>,
-    /// The same with satellite states.
-    pub(super) formed: Formed,
 }
 
 /// Knows ephemerides, time and place, and finds the next.
@@ -182,7 +180,6 @@ impl Navigator {
             receive_time: self.clock.map(|c| c.at(tick)),
             fix,
             raw,
-            formed,
         }
     }
 
@@ -193,16 +190,15 @@ impl Navigator {
         fix: Option<(Solution, Source)>,
     ) -> Navigated {
         let exact = self.clock.is_some_and(|c| c.trust == ClockTrust::Fix);
-        let (raw, formed) = if exact {
-            self.measurements(tick, tracked)
+        let raw = if exact {
+            self.measurements(tick, tracked).0
         } else {
-            Default::default()
+            Vec::new()
         };
         Navigated {
             fix,
             receive_time: self.clock.filter(|_| exact).map(|c| c.at(tick)),
             raw,
-            formed,
         }
     }
 

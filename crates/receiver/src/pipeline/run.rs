@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use gnss_nav::lnav::{DEFAULT_PIVOT_WEEK, LnavEvent};
 use gnss_nav::{GpsTime, SatelliteId};
-use gnss_signal::tracking::NoiseFloor;
+use gnss_signal::tracking::{NoiseFloor, Spectrum, TrackingSettings};
 use gnss_signal::{AcquisitionHit, CorrelatorBank, FrontEnd, Replica, SignalId, Taps};
 
 use super::discontinuity::{self, Jump};
@@ -14,6 +14,7 @@ use super::report;
 use super::schedule::Schedule;
 use super::settings::Settings;
 use super::slot::{Decoded, Slot};
+use super::spectrum::SpectrumSense;
 use crate::ReceiverError;
 use crate::record::{Acquired, Event, EventKind, IonosphereUtcRecord, Record, TapsRecord};
 
@@ -37,6 +38,8 @@ pub fn run<B: CorrelatorBank>(
         noise: NoiseFloor::new(unused, front_end)?,
         navigator: Navigator::new(settings, front_end.sample_rate_hz),
         schedule: Schedule::new(front_end.sample_rate_hz),
+        spectrum: SpectrumSense::default(),
+        tracking: settings.tracking,
         bank,
         settings,
         front_end,
@@ -69,6 +72,8 @@ struct Run<'a, B> {
     noise: NoiseFloor,
     navigator: Navigator,
     schedule: Schedule,
+    spectrum: SpectrumSense,
+    tracking: TrackingSettings,
     slots: Vec<Slot>,
     acquired: BTreeSet<SignalId>,
     excluded: BTreeSet<SatelliteId>,
@@ -89,7 +94,7 @@ impl<B: CorrelatorBank> Run<'_, B> {
                 self.tick(f64::from(epoch) / self.settings.rate_hz),
             );
             let target = next_step.min(next_epoch).min(last);
-            let now = self.bank.advance_to(target)?;
+            let now = self.bank.advance_to(target)?.min(target);
             let ended = now < target || now == last;
             self.receive(now, ended)?;
             if now == next_epoch || (ended && epoch == 1) {
@@ -130,6 +135,9 @@ impl<B: CorrelatorBank> Run<'_, B> {
         self.listen_to_noise(now)?;
         self.search(now, ended)?;
         self.track(now)?;
+        if self.spectrum.is_inverted() && self.tracking.spectrum == Spectrum::Upright {
+            self.invert(now)?;
+        }
         if let Some(jump) = discontinuity::find(&mut self.bank, &self.slots, self.settings, now)? {
             self.jump(now, &jump)?;
             self.track(now)?;
@@ -196,7 +204,7 @@ impl<B: CorrelatorBank> Run<'_, B> {
     fn slot(&self, hit: &AcquisitionHit) -> Slot {
         let near = self.navigator.near();
         let pivot_week = near.map_or(DEFAULT_PIVOT_WEEK, GpsTime::week);
-        Slot::new(hit, self.front_end, self.settings, pivot_week)
+        Slot::new(hit, self.front_end, self.tracking, pivot_week)
     }
 
     /// Correlates and updates all channels, interval by interval, until none has an interval
@@ -235,7 +243,8 @@ impl<B: CorrelatorBank> Run<'_, B> {
         if self.settings.dump_taps {
             self.dump(satellite, replica, taps)?;
         }
-        if update.bit_sync {
+        if let Some(sync) = update.bit_sync {
+            self.spectrum.weigh(&sync);
             self.emit(now, Some(satellite), EventKind::BitSync)?;
         }
         if from != to {
@@ -306,6 +315,15 @@ impl<B: CorrelatorBank> Run<'_, B> {
         }
     }
 
+    /// Starts every channel anew, from its first sample, with the spectrum inverted.
+    fn invert(&mut self, now: u64) -> Result<(), ReceiverError> {
+        self.tracking.spectrum = Spectrum::Inverted;
+        self.emit(now, None, EventKind::SpectrumInverted)?;
+        let hits: Vec<_> = self.slots.iter().map(|s| s.hit).collect();
+        self.slots = hits.iter().map(|hit| self.slot(hit)).collect();
+        self.track(now)
+    }
+
     /// Starts every channel anew after a jump of the samples.
     fn jump(&mut self, now: u64, jump: &Jump) -> Result<(), ReceiverError> {
         let kind = EventKind::Discontinuity {
@@ -354,12 +372,12 @@ impl<B: CorrelatorBank> Run<'_, B> {
             .collect();
         let navigated = self.navigator.navigate(now, &mut tracked);
         let observations = report::observations(time_s, &mut tracked, &navigated);
+        if let Some(observations) = observations {
+            (self.sink)(Record::Observations(observations))?;
+        }
         for one in &tracked {
             let record = report::channel(time_s, one, &navigated);
             (self.sink)(Record::Channel(record))?;
-        }
-        if let Some(observations) = observations {
-            (self.sink)(Record::Observations(observations))?;
         }
         let fix = navigated.fix.as_ref();
         if let Some((solution, source)) = fix {

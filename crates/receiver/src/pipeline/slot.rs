@@ -2,16 +2,19 @@
 
 use gnss_nav::lnav::{LnavDecoder, LnavEvent, NavBit, Polarity, nearest_time};
 use gnss_nav::{GpsTime, SatelliteId};
-use gnss_signal::tracking::{Channel, ChannelEpoch, ChannelUpdate, Lock, NoiseFloor};
+use gnss_signal::tracking::{
+    Channel, ChannelEpoch, ChannelUpdate, Lock, NoiseFloor, TrackingSettings,
+};
 use gnss_signal::{AcquisitionHit, FrontEnd, Replica, Signal, Taps};
 
-use super::settings::Settings;
 
 /// One satellite being received.
 #[derive(Debug, Clone)]
 pub(super) struct Slot {
     pub(super) satellite: SatelliteId,
     pub(super) channel: Channel,
+    /// Where the channel began.
+    pub(super) hit: AcquisitionHit,
     decoder: LnavDecoder,
     frame: Option<Frame>,
     /// Subframes received with every word good since the channel began, bit 0 = subframe 1.
@@ -37,13 +40,14 @@ impl Slot {
     pub(super) fn new(
         hit: &AcquisitionHit,
         front_end: FrontEnd,
-        settings: &Settings,
+        tracking: TrackingSettings,
         pivot_week: i32,
     ) -> Self {
         let satellite = SatelliteId::gps(hit.signal.prn());
         Self {
             satellite,
-            channel: Channel::new(hit, front_end, settings.tracking),
+            hit: *hit,
+            channel: Channel::new(hit, front_end, tracking),
             decoder: LnavDecoder::new(satellite, pivot_week),
             frame: None,
             subframes: 0,
@@ -61,7 +65,7 @@ impl Slot {
         noise: &NoiseFloor,
     ) -> (ChannelUpdate, Vec<Decoded>) {
         let update = self.channel.update(replica, taps, noise);
-        self.bits_found |= update.bit_sync;
+        self.bits_found |= update.bit_sync.is_some();
         let decoded = update.bit.map_or_else(Vec::new, |bit| {
             self.decoder.push(NavBit {
                 soft: bit.soft,

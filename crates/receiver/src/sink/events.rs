@@ -98,6 +98,7 @@ pub const fn kind_name(kind: &EventKind) -> &'static str {
         EventKind::FrameSync { .. } => "frame_sync",
         EventKind::Dropped => "dropped",
         EventKind::Discontinuity { .. } => "discontinuity",
+        EventKind::SpectrumInverted => "spectrum_inverted",
         EventKind::EphemerisDecoded { .. } => "ephemeris_decoded",
         EventKind::IonosphereUtcDecoded => "ionosphere_utc_decoded",
         EventKind::FirstFix => "first_fix",
@@ -150,6 +151,7 @@ fn detail(kind: &EventKind) -> Detail<'_> {
             threshold: *threshold,
         },
         EventKind::BitSync
+        | EventKind::SpectrumInverted
         | EventKind::Dropped
         | EventKind::IonosphereUtcDecoded
         | EventKind::FirstFix
