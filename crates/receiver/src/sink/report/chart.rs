@@ -15,7 +15,6 @@ const BOTTOM: f64 = 40.0;
 pub(super) struct Line<'a> {
     pub(super) label: String,
     pub(super) colour: String,
-    pub(super) dashed: bool,
     pub(super) series: &'a Series,
 }
 
@@ -30,6 +29,8 @@ pub(super) struct Chart<'a> {
     pub(super) unit: &'a str,
     pub(super) lines: Vec<Line<'a>>,
     pub(super) marks: &'a [Mark],
+    /// Values to draw a dashed line at: thresholds.
+    pub(super) levels: &'a [f64],
     /// Whether the vertical axis shows zero.
     pub(super) from_zero: bool,
 }
@@ -60,6 +61,13 @@ impl Chart<'_> {
             "<svg viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" class=\"chart\">\n{}",
             axes(&scale, self.unit)
         );
+        for level in self.levels {
+            let (y, right) = (scale.y(*level), WIDTH - RIGHT);
+            let _ = writeln!(
+                svg,
+                "<line x1=\"{LEFT}\" y1=\"{y:.1}\" x2=\"{right}\" y2=\"{y:.1}\" class=\"level\"/>"
+            );
+        }
         for mark in self.marks {
             svg += &draw_mark(&scale, mark);
         }
@@ -82,6 +90,9 @@ impl Chart<'_> {
         let mut high = most(&mut buckets().map(|b| b.most));
         if self.from_zero {
             (low, high) = (low.min(0.0), high.max(0.0));
+        }
+        for level in self.levels {
+            (low, high) = (low.min(*level), high.max(*level));
         }
         let margin = (0.05 * (high - low)).max(1e-6 + 1e-3 * high.abs());
         if !(self.from_zero && low == 0.0) {
@@ -131,11 +142,6 @@ impl Chart<'_> {
 
 fn draw_line(scale: &Scale, line: &Line<'_>) -> String {
     let mut svg = String::new();
-    let dash = if line.dashed {
-        " stroke-dasharray=\"5 4\""
-    } else {
-        ""
-    };
     for stretch in stretches(line.series) {
         let colour = &line.colour;
         let spread = stretch.iter().any(|b| b.most > b.least);
@@ -159,7 +165,7 @@ fn draw_line(scale: &Scale, line: &Line<'_>) -> String {
         let points = points(scale, stretch.iter().map(|b| (b.middle_s(), b.mean())));
         let _ = writeln!(
             svg,
-            "<polyline points=\"{points}\" stroke=\"{colour}\"{dash} class=\"line\"/>"
+            "<polyline points=\"{points}\" stroke=\"{colour}\" class=\"line\"/>"
         );
     }
     svg
@@ -290,10 +296,10 @@ mod tests {
             lines: vec![Line {
                 label: "G07".to_owned(),
                 colour: "red".to_owned(),
-                dashed: false,
                 series,
             }],
             marks: &[],
+            levels: &[2.0],
             from_zero: true,
         };
         let svg = chart(&series).svg().unwrap();

@@ -44,8 +44,8 @@ pub struct Report {
 #[derive(Debug, Default)]
 struct SatelliteHistory {
     cn0_dbhz: Series,
-    innovation_m: Series,
-    threshold_m: Series,
+    /// Innovation of the pseudorange over its standard deviation.
+    innovation: Series,
     sky: sky::Path<2>,
 }
 
@@ -100,8 +100,7 @@ impl Report {
         let history = self.satellites.entry(channel.satellite).or_default();
         history.cn0_dbhz.push(channel.time_s, channel.cn0_dbhz);
         if let Some(InnovationRecord { value, sigma }) = channel.innovation_code_m {
-            history.innovation_m.push(channel.time_s, value);
-            history.threshold_m.push(channel.time_s, 3.0 * sigma);
+            history.innovation.push(channel.time_s, value / sigma);
         }
     }
 

@@ -15,10 +15,10 @@ body{margin:0;background:var(--paper);color:var(--ink);font:15px/1.5 system-ui,'
 main{max-width:1000px;margin:0 auto;padding:28px 20px 60px}
 h1{font-size:24px;margin:0 0 2px;overflow-wrap:anywhere}h2{font-size:16px;margin:0 0 10px}
 p.sub{color:var(--soft);margin:0 0 20px}
-.tiles{display:grid;grid-template-columns:repeat(auto-fit,minmax(150px,1fr));gap:12px;margin-bottom:16px}
+.tiles{display:grid;grid-template-columns:repeat(auto-fit,minmax(168px,1fr));gap:12px;margin-bottom:16px}
 .tile,.card{background:var(--card);border:1px solid var(--rule);border-radius:10px;padding:14px 16px}
 .card{margin-bottom:16px;overflow-x:auto}
-.tile b{display:block;font-size:20px;font-weight:600;font-variant-numeric:tabular-nums}
+.tile b{display:block;font-size:19px;font-weight:600;font-variant-numeric:tabular-nums}
 .tile span{color:var(--soft);font-size:13px}
 .pair{display:grid;grid-template-columns:repeat(auto-fit,minmax(330px,1fr));gap:16px}
 .warn{border-color:var(--alarm);color:var(--alarm)}
@@ -30,8 +30,11 @@ svg{display:block;width:100%;height:auto}svg.square{max-width:420px;margin:0 aut
 .tick{fill:var(--soft);font-size:11px}.label{font-size:12px;font-weight:600}text.label:not([fill]){fill:var(--soft)}
 .line{fill:none;stroke-width:1.6;stroke-linejoin:round}.faint{fill:none;stroke:var(--accent);opacity:.35}
 .dot{fill:var(--accent);opacity:.7}.badge{fill:#fff;font-size:10.5px;font-weight:700}
-.mark{stroke:var(--alarm);stroke-dasharray:3 3}.marktext{fill:var(--alarm);font-size:10px}
+.level{stroke:var(--alarm);stroke-dasharray:6 4;opacity:.7}.mark{stroke:var(--alarm);stroke-dasharray:3 3}.marktext{fill:var(--alarm);font-size:10px}
 ";
+
+/// Standard deviations at which the innovation chart has its dashed lines.
+const INNOVATION_LEVEL: f64 = 3.0;
 
 /// The whole page.
 pub(super) fn page(report: &Report, summary: &Summary) -> String {
@@ -54,19 +57,14 @@ pub(super) fn page(report: &Report, summary: &Summary) -> String {
     html += &tiles(summary);
     html += "<div class=\"pair\">\n";
     html += &card("Sky", Some(sky(report)));
-    html += &card("Satellites acquired", Some(satellites(summary)));
-    html += "</div>\n";
-    html += &card("C/N0", cn0(report, &marks));
-    html += &card(
-        "Code innovations, with three standard deviations",
-        innovations(report, &marks),
-    );
-    html += &card("Position error", position_error(report, &marks));
-    html += "<div class=\"pair\">\n";
     html += &card("Positions, from the first one", ground_plot(&report.track));
-    html += &card("Height above the ellipsoid", height(report, &marks));
     html += "</div>\n";
+    html += &card("Position error", position_error(report, &marks));
+    html += &card("C/N0", cn0(report, &marks));
+    html += &card("Code innovations", innovations(report, &marks));
+    html += &card("Height above the ellipsoid", height(report, &marks));
     html += &card("Faults", faults(summary));
+    html += &card("Satellites acquired", Some(satellites(summary)));
     html + "</main></body></html>\n"
 }
 
@@ -152,25 +150,18 @@ fn cn0(report: &Report, marks: &[Mark]) -> Option<String> {
         unit: "C/N0 (dB-Hz)",
         lines: per_satellite(report, |history| &history.cn0_dbhz),
         marks,
+        levels: &[],
         from_zero: false,
     };
     chart.svg()
 }
 
 fn innovations(report: &Report, marks: &[Mark]) -> Option<String> {
-    let mut lines = per_satellite(report, |history| &history.innovation_m);
-    for (i, history) in report.satellites.values().enumerate() {
-        lines.push(Line {
-            label: String::new(),
-            colour: colour(i),
-            dashed: true,
-            series: &history.threshold_m,
-        });
-    }
     let chart = Chart {
-        unit: "innovation (m)",
-        lines,
+        unit: "innovation / sigma",
+        lines: per_satellite(report, |history| &history.innovation),
         marks,
+        levels: &[-INNOVATION_LEVEL, INNOVATION_LEVEL],
         from_zero: true,
     };
     chart.svg()
@@ -180,7 +171,6 @@ fn position_error(report: &Report, marks: &[Mark]) -> Option<String> {
     let line = |label: &str, colour: &str, series| Line {
         label: label.to_owned(),
         colour: colour.to_owned(),
-        dashed: false,
         series,
     };
     let chart = Chart {
@@ -190,6 +180,7 @@ fn position_error(report: &Report, marks: &[Mark]) -> Option<String> {
             line("up", "#d08b17", &report.vertical_error_m),
         ],
         marks,
+        levels: &[],
         from_zero: true,
     };
     chart.svg()
@@ -201,10 +192,10 @@ fn height(report: &Report, marks: &[Mark]) -> Option<String> {
         lines: vec![Line {
             label: String::new(),
             colour: "var(--accent)".to_owned(),
-            dashed: false,
             series: &report.height_m,
         }],
         marks,
+        levels: &[],
         from_zero: false,
     };
     chart.svg()
@@ -221,7 +212,6 @@ fn per_satellite<'a>(
         .map(|(i, (satellite, history))| Line {
             label: satellite.to_string(),
             colour: colour(i),
-            dashed: false,
             series: series(history),
         })
         .collect()
