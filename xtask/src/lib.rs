@@ -1,1 +1,6 @@
-//! Project tasks.
+//! Project tasks: made-up signals, experiments on them, and the checks of the tree.
+
+pub mod code_noise;
+pub mod constellation;
+pub mod demo;
+pub mod synthesis;

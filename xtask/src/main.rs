@@ -1,3 +1,95 @@
 //! Command line of the project tasks.
 
-fn main() {}
+use std::io::{self, Write};
+use std::process::ExitCode;
+
+use anyhow::Result;
+use clap::{Parser, Subcommand};
+use xtask::code_noise::{self, Experiment};
+use xtask::demo::demo;
+
+#[derive(Debug, Parser)]
+#[command(
+    name = "cargo xtask",
+    about = "Project tasks",
+    disable_help_subcommand = true
+)]
+struct Arguments {
+    #[command(subcommand)]
+    task: Task,
+}
+
+#[derive(Debug, Subcommand)]
+enum Task {
+    /// Make half a second of signal on the spot, receive it with rough aiding, judge the position.
+    Demo {
+        /// Seed of the noise.
+        #[arg(long, default_value_t = 1)]
+        seed: u64,
+    },
+    /// Code tracking error at sample rates with and without an integer number of samples per chip.
+    CodeNoise {
+        /// C/N0 before the front end, dB-Hz.
+        #[arg(long, value_name = "DBHZ", default_value_t = 45.0)]
+        cn0: f64,
+        /// Judged signal of each run, s.
+        #[arg(long, value_name = "S", default_value_t = 20.0)]
+        judged: f64,
+        /// Signal before that, s.
+        #[arg(long, value_name = "S", default_value_t = 10.0)]
+        settle: f64,
+        /// Runs of each case.
+        #[arg(long, value_name = "N", default_value_t = 8)]
+        seeds: u64,
+        /// Code loop bandwidth, Hz [default: the receiver's]
+        #[arg(long, value_name = "HZ")]
+        code_bandwidth: Option<f64>,
+    },
+}
+
+fn main() -> ExitCode {
+    match perform(Arguments::parse().task) {
+        Ok(code) => code,
+        Err(error) => {
+            // Nothing is left to do where standard error is closed too.
+            let _ = writeln!(io::stderr(), "error: {error:#}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn perform(task: Task) -> Result<ExitCode> {
+    let mut out = io::stdout().lock();
+    match task {
+        Task::Demo { seed } => {
+            let demo = demo(seed)?;
+            writeln!(out, "{demo}")?;
+            Ok(if demo.holds() {
+                ExitCode::SUCCESS
+            } else {
+                ExitCode::FAILURE
+            })
+        }
+        Task::CodeNoise {
+            cn0,
+            judged,
+            settle,
+            seeds,
+            code_bandwidth,
+        } => {
+            let mut experiment = Experiment {
+                cn0_dbhz: cn0,
+                judged_s: judged,
+                settle_s: settle,
+                seeds,
+                ..Experiment::default()
+            };
+            if let Some(bandwidth_hz) = code_bandwidth {
+                experiment.tracking.code_locked_hz = bandwidth_hz;
+                experiment.tracking.code_unlocked_hz = bandwidth_hz;
+            }
+            writeln!(out, "{}", code_noise::table(&experiment)?)?;
+            Ok(ExitCode::SUCCESS)
+        }
+    }
+}

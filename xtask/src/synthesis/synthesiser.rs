@@ -1,0 +1,155 @@
+//! A stream of samples made from a scene.
+
+use std::io;
+
+use anyhow::Result;
+use gnss_signal::sample::{SampleDescription, SampleSource};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+use super::baseband::{LONGEST_BLOCK_S, Modulator, Planes};
+use super::filter::{HALF_TAPS, LowPass, shift};
+use super::quantise::Quantiser;
+use super::scene::Scene;
+
+/// Makes the samples of a [`Scene`], a block of at most 2 ms at a time.
+///
+/// The same scene gives the same bytes, however they are read.
+pub struct Synthesiser {
+    description: SampleDescription,
+    length_ticks: i64,
+    block_ticks: i64,
+    modulators: Vec<Modulator>,
+    noise: ChaCha8Rng,
+    filter: Option<LowPass>,
+    quantiser: Quantiser,
+    /// Next tick to make, and next to hand out (they differ by the filter's length).
+    made: i64,
+    out: i64,
+    planes: Planes,
+    bytes: Vec<u8>,
+    taken: usize,
+}
+
+impl Synthesiser {
+    /// A synthesiser at the first sample of `scene`.
+    ///
+    /// # Errors
+    /// Where a value of the scene is impossible.
+    pub fn new(scene: Scene) -> Result<Self> {
+        scene.check()?;
+        let filter = scene.bandwidth.map(LowPass::new);
+        let amplitudes: Vec<f64> = scene
+            .signals
+            .iter()
+            .map(|s| scene.amplitude(s.cn0_dbhz))
+            .collect();
+        let noise_power = filter.as_ref().map_or(1.0, LowPass::noise_gain);
+        let signal_power: f64 = amplitudes.iter().map(|a| a * a / 2.0).sum();
+        let rms = (noise_power + signal_power).sqrt();
+        // The filter looks half its length ahead and back.
+        let reach = if filter.is_some() {
+            HALF_TAPS as i64
+        } else {
+            0
+        };
+        Ok(Self {
+            description: scene.samples,
+            length_ticks: scene.length_ticks(),
+            block_ticks: (LONGEST_BLOCK_S * scene.samples.sample_rate_hz) as i64,
+            noise: ChaCha8Rng::seed_from_u64(scene.seed),
+            filter,
+            quantiser: Quantiser::new(scene.samples.format, rms)?,
+            made: -reach,
+            out: -2 * reach,
+            planes: Planes::default(),
+            bytes: Vec::new(),
+            taken: 0,
+            modulators: scene
+                .signals
+                .into_iter()
+                .zip(amplitudes)
+                .map(|(signal, amplitude)| Modulator::new(signal, amplitude))
+                .collect(),
+        })
+    }
+
+    /// Makes the bytes of the next block; none at the end.
+    fn next_block(&mut self) -> Result<()> {
+        self.bytes.clear();
+        self.taken = 0;
+        while self.bytes.is_empty() && self.out < self.length_ticks {
+            let samples = self.block_ticks as usize;
+            self.make(samples)?;
+            self.emit(samples);
+        }
+        Ok(())
+    }
+
+    /// Signals, noise and filter over the next `samples` ticks.
+    fn make(&mut self, samples: usize) -> Result<()> {
+        let rate_hz = self.description.sample_rate_hz;
+        self.planes.clear(samples);
+        for modulator in &mut self.modulators {
+            modulator.add(self.made, samples, rate_hz, &mut self.planes)?;
+        }
+        let (i, q) = (&mut self.planes.i[..samples], &mut self.planes.q[..samples]);
+        for (i, q) in i.iter_mut().zip(q) {
+            let (a, b): (f32, f32) = (
+                StandardNormal.sample(&mut self.noise),
+                StandardNormal.sample(&mut self.noise),
+            );
+            *i += a;
+            *q += b;
+        }
+        if let Some(filter) = &mut self.filter {
+            filter.filter(samples, &mut self.planes);
+        }
+        self.made += samples as i64;
+        Ok(())
+    }
+
+    /// Shifts and quantises what was made, from tick 0 to the end of the scene.
+    fn emit(&mut self, samples: usize) {
+        let description = self.description;
+        let frequency = description.intermediate_frequency_hz / description.sample_rate_hz;
+        if frequency != 0.0 {
+            shift(frequency, self.out, samples, &mut self.planes);
+        }
+        let first = (-self.out).clamp(0, samples as i64) as usize;
+        let end = (self.length_ticks - self.out).clamp(0, samples as i64) as usize;
+        let complex = description.format.is_complex();
+        for n in first..end {
+            let (mut i, mut q) = (self.planes.i[n], self.planes.q[n]);
+            if description.swap_iq {
+                (i, q) = (q, i);
+            }
+            self.quantiser.push(i, &mut self.bytes);
+            if complex {
+                self.quantiser.push(q, &mut self.bytes);
+            }
+        }
+        self.out += samples as i64;
+        if self.out >= self.length_ticks {
+            self.quantiser.finish(&mut self.bytes);
+        }
+    }
+}
+
+impl SampleSource for Synthesiser {
+    fn description(&self) -> SampleDescription {
+        self.description
+    }
+
+    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
+        if self.taken == self.bytes.len() {
+            self.next_block().map_err(io::Error::other)?;
+        }
+        let ready = &self.bytes[self.taken..];
+        let len = ready.len().min(bytes.len());
+        bytes[..len].copy_from_slice(&ready[..len]);
+        self.taken += len;
+        Ok(len)
+    }
+}
