@@ -150,7 +150,7 @@ fn length_text(length: u64, recording: &Recording, format: SampleFormat) -> Stri
     if let Some(rate_hz) = recording.sample_rate_hz {
         let _ = write!(text, ", {:.6} s at {rate_hz} Hz", count as f64 / rate_hz);
     }
-    if length * 8 % bits != 0 {
+    if !(length * 8).is_multiple_of(bits) {
         text += "; the last one is cut off";
     }
     text + "\n"

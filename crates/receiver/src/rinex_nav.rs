@@ -207,6 +207,8 @@ mod tests {
     use super::*;
     use crate::sink::navigation::accuracy_m;
 
+    // A test that checks nothing has to say so.
+    #[allow(clippy::print_stdout)]
     fn data(name: &str) -> Option<PathBuf> {
         let root = std::env::var_os("GNSS_TEST_DATA").map_or_else(
             || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"),

@@ -378,7 +378,7 @@ mod tests {
             kind: EventKind::Acquired(Acquired {
                 satellite: SatelliteId::gps(prn),
                 doppler_hz,
-                code_phase_chips: 1022.999_99,
+                code_phase_chips: 1_022.999_99,
                 statistic: 20.0,
                 cn0_dbhz: 45.0,
             }),

@@ -32,7 +32,8 @@ pub(super) fn run(options: RunOptions, out: &mut dyn Write) -> Result<(), Receiv
         directory: config.out.clone(),
         monitors: Vec::new(),
         dump_taps: config.dump_taps,
-        title: config.recording.input.to_string(),
+        // Not the name of the input: a file and standard input give the same bytes.
+        title: "GPS receiver run".to_owned(),
     })?;
     let received = receive(source, &config, &settings, &mut |record| {
         outputs.record(&record)

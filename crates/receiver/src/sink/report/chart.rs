@@ -7,7 +7,7 @@ use super::series::Series;
 const WIDTH: f64 = 900.0;
 const HEIGHT: f64 = 280.0;
 const LEFT: f64 = 62.0;
-const RIGHT: f64 = 70.0;
+const RIGHT: f64 = 80.0;
 const TOP: f64 = 14.0;
 const BOTTOM: f64 = 40.0;
 
