@@ -3,6 +3,7 @@
 pub mod cli;
 pub mod config;
 pub mod cost;
+mod csv;
 mod error;
 pub mod inspect;
 pub mod pipeline;

@@ -1,14 +1,13 @@
 //! Truth of a run, and the errors of its solutions. For judging afterwards only: the pipeline
 //! never sees it.
 
-use std::fs::File;
-use std::io::{BufRead, BufReader};
 use std::path::Path;
 
 use gnss_nav::geodesy::Geodetic;
 use nalgebra::Vector3;
 
 use crate::ReceiverError;
+use crate::csv::{Table, content};
 use crate::sink::rounded;
 use crate::summary::{ErrorStatistics, VelocityError};
 
@@ -214,105 +213,6 @@ impl Accumulator {
                 up: rms(self.velocity_squares.z),
             },
         })
-    }
-}
-
-/// Rows of a CSV file with a header, reduced to the columns asked for.
-struct Table {
-    path: std::path::PathBuf,
-    lines: std::io::Lines<BufReader<File>>,
-    columns: Vec<usize>,
-    names: Vec<String>,
-    line: usize,
-}
-
-struct Row<'a> {
-    path: std::path::PathBuf,
-    line: usize,
-    cells: Vec<String>,
-    names: std::borrow::Cow<'a, [String]>,
-}
-
-impl Table {
-    fn open(path: &Path, names: &[&str]) -> Result<Self, ReceiverError> {
-        let file_error = |source| ReceiverError::File {
-            path: path.to_owned(),
-            source,
-        };
-        let mut lines = BufReader::new(File::open(path).map_err(file_error)?).lines();
-        let header = lines
-            .next()
-            .transpose()
-            .map_err(file_error)?
-            .unwrap_or_default();
-        let titles: Vec<&str> = header.trim().split(',').map(str::trim).collect();
-        let column = |name: &&str| {
-            let found = titles.iter().position(|title| title == name);
-            let expected = names.join(",");
-            found.ok_or_else(|| content(path, format!("no column '{name}': expected {expected}")))
-        };
-        Ok(Self {
-            path: path.to_owned(),
-            lines,
-            columns: names.iter().map(column).collect::<Result<_, _>>()?,
-            names: names.iter().map(|name| (*name).to_owned()).collect(),
-            line: 1,
-        })
-    }
-}
-
-impl Iterator for Table {
-    type Item = Result<Row<'static>, ReceiverError>;
-
-    fn next(&mut self) -> Option<Self::Item> {
-        loop {
-            let line = match self.lines.next()? {
-                Ok(line) => line,
-                Err(source) => {
-                    let path = self.path.clone();
-                    return Some(Err(ReceiverError::File { path, source }));
-                }
-            };
-            self.line += 1;
-            if line.trim().is_empty() {
-                continue;
-            }
-            let cells: Vec<&str> = line.trim().split(',').collect();
-            let cell = |column: &usize| cells.get(*column).unwrap_or(&"").trim().to_owned();
-            return Some(Ok(Row {
-                path: self.path.clone(),
-                line: self.line,
-                cells: self.columns.iter().map(cell).collect(),
-                names: self.names.clone().into(),
-            }));
-        }
-    }
-}
-
-impl Row<'_> {
-    fn text(&self, column: usize) -> &str {
-        &self.cells[column]
-    }
-
-    fn number(&self, column: usize) -> Result<f64, ReceiverError> {
-        match self.cells[column].parse::<f64>() {
-            Ok(value) if value.is_finite() => Ok(value),
-            _ => Err(self.error(&format!(
-                "{} is '{}': expected a number",
-                self.names[column], self.cells[column]
-            ))),
-        }
-    }
-
-    fn error(&self, what: &str) -> ReceiverError {
-        content(&self.path, format!("line {}: {what}", self.line))
-    }
-}
-
-fn content(path: &Path, what: String) -> ReceiverError {
-    ReceiverError::Content {
-        path: path.to_owned(),
-        what,
     }
 }
 
