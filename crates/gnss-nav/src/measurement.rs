@@ -122,7 +122,8 @@ fn join(
 
 /// Variance that tracking noise does not cover.
 ///
-/// sigma^2 = (ura_fraction URA)^2 + (ionosphere_fraction I)^2 + (troposphere_fraction T)^2, where
+/// sigma^2 = (ura_fraction URA)^2 + (ionosphere_fraction I)^2 + (troposphere_fraction T)^2
+/// plus, at low elevation, what the shape of the troposphere model is wrong by, where
 /// I and T are the modelled delays: a delay that is switched off adds nothing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ErrorModel {
@@ -141,6 +142,21 @@ impl ErrorModel {
         ionosphere_fraction: 0.0,
         troposphere_fraction: 0.0,
     };
+
+    /// Variance of a modelled tropospheric delay.
+    ///
+    /// The plane atmosphere of the model makes too much of low satellites, compared with the
+    /// spherical one of Black1984: by 2 % at 10 degrees, 11 % at 5, half at 1.5.
+    fn troposphere_variance_m2(&self, delay_m: f64, elevation_rad: f64) -> f64 {
+        let sine = elevation_rad.sin();
+        let too_much = 1.0 - 1.001 * sine / (0.002_001 + sine * sine).sqrt();
+        let shape = if self.troposphere_fraction > 0.0 {
+            too_much.max(0.0)
+        } else {
+            0.0
+        };
+        (self.troposphere_fraction.powi(2) + shape.powi(2)) * delay_m * delay_m
+    }
 }
 
 impl Default for ErrorModel {
@@ -208,7 +224,7 @@ impl MeasurementModel {
                 + ionosphere_m
                 + troposphere_m,
             delay_variance_m2: (errors.ionosphere_fraction * ionosphere_m).powi(2)
-                + (errors.troposphere_fraction * troposphere_m).powi(2),
+                + errors.troposphere_variance_m2(troposphere_m, look.elevation_rad),
             line_of_sight,
             look,
         }

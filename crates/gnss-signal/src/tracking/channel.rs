@@ -156,7 +156,10 @@ impl Channel {
         match &self.stage {
             Stage::PullIn(p) => {
                 let taps = TapOffsets::early_prompt_late(self.settings.spacing_chips);
-                Some(p.nco.replica(p.nco.tick_of_period(p.nco.nearest_period() + 1), taps))
+                Some(
+                    p.nco
+                        .replica(p.nco.tick_of_period(p.nco.nearest_period() + 1), taps),
+                )
             }
             Stage::Steady(s) => Some(s.replica()),
             Stage::Lost(..) => None,
@@ -220,7 +223,9 @@ impl Channel {
                     p.restart(&found);
                 }
             }
-            _ if periods >= JUDGE_PERIODS => self.stage = Stage::Lost(p.nco.signal, p.nco.doppler_hz),
+            _ if periods >= JUDGE_PERIODS => {
+                self.stage = Stage::Lost(p.nco.signal, p.nco.doppler_hz)
+            }
             _ => {}
         }
         ChannelUpdate::default()
@@ -245,7 +250,8 @@ impl PullIn {
     }
 
     fn estimate(&self, settings: &TrackingSettings) -> Option<PullInEstimate> {
-        self.stretch.estimate(self.period_s(), settings.spacing_chips)
+        self.stretch
+            .estimate(self.period_s(), settings.spacing_chips)
     }
 
     /// The oscillators at the start, corrected by the estimate.
@@ -281,9 +287,8 @@ impl PullIn {
         let second_bits = found.whole_bits - first_bits;
         // The halves' middles lie half the whole bits apart.
         let apart_s = found.whole_bits as f64 * bit_s / 2.0;
-        let variance = |bits: usize| {
-            code_variance_chips2(found.cn0_hz, bits as f64 * bit_s, spacing_chips)
-        };
+        let variance =
+            |bits: usize| code_variance_chips2(found.cn0_hz, bits as f64 * bit_s, spacing_chips);
         let fitted_hz = self.start.spectrum.sign() * found.doppler_offset_hz;
         BitSync {
             doppler_hz: self.start.doppler_hz + found.doppler_offset_hz,
@@ -413,7 +418,11 @@ mod tests {
             // Code errors are correlated over some 5 s: 12 runs of 8 s hold about 20 independent
             // ones, whose mean square spreads by 0.3; Dopplers 960, 0.05, and some excess for
             // what the acceleration adds.
-            assert!((0.4..2.0).contains(&(code / count)), "code {} at {cn0}", code / count);
+            assert!(
+                (0.4..2.0).contains(&(code / count)),
+                "code {} at {cn0}",
+                code / count
+            );
             let ratio = doppler / count;
             assert!((0.8..1.5).contains(&ratio), "Doppler {ratio} at {cn0}");
         }

@@ -46,8 +46,10 @@ impl CodeDiscriminator {
             Self::Power => slope_free / 2.0 * ratio(e * e - l * l, e * e + l * l),
             Self::Coherent => {
                 let prompt = taps.prompt.re;
-                0.5 * ratio((taps.early.re - taps.late.re) * prompt.signum(), prompt.abs())
-                    * peak_correction(taps, spacing_chips)
+                0.5 * ratio(
+                    (taps.early.re - taps.late.re) * prompt.signum(),
+                    prompt.abs(),
+                ) * peak_correction(taps, spacing_chips)
             }
             Self::DotProduct => {
                 let difference = taps.early - taps.late;
@@ -153,11 +155,15 @@ mod tests {
                         CodeDiscriminator::DotProduct,
                     ] {
                         // Rounding of a few operations on values near 1.
-                        assert_abs_diff_eq!(kind.error_chips(&taps, spacing), error, epsilon = 1e-12);
+                        assert_abs_diff_eq!(
+                            kind.error_chips(&taps, spacing),
+                            error,
+                            epsilon = 1e-12
+                        );
                     }
                 }
-                let power = CodeDiscriminator::Power
-                    .error_chips(&triangle(error, spacing, 0.2), spacing);
+                let power =
+                    CodeDiscriminator::Power.error_chips(&triangle(error, spacing, 0.2), spacing);
                 // (E^2-L^2)/(E^2+L^2) = 2x/(1+x^2) with x = error / (1 - spacing/2).
                 let x = error / (1.0 - spacing / 2.0);
                 assert_abs_diff_eq!(power, error / (1.0 + x * x), epsilon = 1e-12);
@@ -195,8 +201,16 @@ mod tests {
             let phase = f64::from(step) / 100.0;
             let sum = Complex64::from_polar(3.0, TAU * phase);
             // Rounding only.
-            assert_abs_diff_eq!(PhaseDiscriminator::Costas.error_cycles(sum), phase, epsilon = 1e-14);
-            assert_abs_diff_eq!(PhaseDiscriminator::Costas.error_cycles(-sum), phase, epsilon = 1e-14);
+            assert_abs_diff_eq!(
+                PhaseDiscriminator::Costas.error_cycles(sum),
+                phase,
+                epsilon = 1e-14
+            );
+            assert_abs_diff_eq!(
+                PhaseDiscriminator::Costas.error_cycles(-sum),
+                phase,
+                epsilon = 1e-14
+            );
             let wide = Complex64::from_polar(3.0, TAU * 2.0 * phase);
             let four = PhaseDiscriminator::FourQuadrant.error_cycles(wide);
             assert_abs_diff_eq!(four, 2.0 * phase, epsilon = 1e-14);
@@ -213,13 +227,16 @@ mod tests {
             let atan = FrequencyDiscriminator::Atan;
             // Rounding of an angle near 1, divided by dt.
             assert_abs_diff_eq!(atan.error_hz(first, second, dt), frequency, epsilon = 1e-11);
-            assert_abs_diff_eq!(atan.error_hz(first, -second, dt), frequency, epsilon = 1e-11);
+            assert_abs_diff_eq!(
+                atan.error_hz(first, -second, dt),
+                frequency,
+                epsilon = 1e-11
+            );
             let four = FrequencyDiscriminator::FourQuadrant.error_hz(first, second, dt);
             assert_abs_diff_eq!(four, frequency, epsilon = 1e-11);
             let paper = FrequencyDiscriminator::CrossSignDot.error_hz(first, second, dt);
-            let expected = (TAU * frequency * dt).sin()
-                * (TAU * frequency * dt).cos().signum()
-                / (TAU * dt);
+            let expected =
+                (TAU * frequency * dt).sin() * (TAU * frequency * dt).cos().signum() / (TAU * dt);
             assert_abs_diff_eq!(paper, expected, epsilon = 1e-11);
         }
     }

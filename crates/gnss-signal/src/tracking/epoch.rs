@@ -77,8 +77,15 @@ impl PreFilter {
     pub(super) fn phase_line(&self) -> Option<PhaseLine> {
         let n = self.held.len() as f64;
         let middle_s = self.held.iter().map(|i| i.middle_s).sum::<f64>() / n;
-        let spread_s2: f64 = self.held.iter().map(|i| (i.middle_s - middle_s).powi(2)).sum();
-        let phases = self.held.iter().map(|i| (i.middle_s - middle_s) * i.phase_cycles);
+        let spread_s2: f64 = self
+            .held
+            .iter()
+            .map(|i| (i.middle_s - middle_s).powi(2))
+            .sum();
+        let phases = self
+            .held
+            .iter()
+            .map(|i| (i.middle_s - middle_s) * i.phase_cycles);
         (spread_s2 > 0.0).then(|| PhaseLine {
             middle_s,
             slope_hz: phases.sum::<f64>() / spread_s2,

@@ -68,7 +68,11 @@ impl LockDetector {
             0.0
         };
         self.cosine += (interval_s / COSINE_TIME_S).min(1.0) * (cosine - self.cosine);
-        let limit = if self.carrier { CARRIER_OFF } else { CARRIER_ON };
+        let limit = if self.carrier {
+            CARRIER_OFF
+        } else {
+            CARRIER_ON
+        };
         self.carrier = strong_enough && self.cosine > limit;
         self.below_s = if strong_enough {
             0.0

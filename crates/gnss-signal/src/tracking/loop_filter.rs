@@ -153,7 +153,11 @@ mod tests {
     #[test]
     fn second_order_follows_a_constant_frequency() {
         // 4 s are 60 time constants: only rounding is left.
-        assert_abs_diff_eq!(settle(LoopOrder::Second, 3.0, 0.0, PLL), 0.0, epsilon = 1e-9);
+        assert_abs_diff_eq!(
+            settle(LoopOrder::Second, 3.0, 0.0, PLL),
+            0.0,
+            epsilon = 1e-9
+        );
         let w: f64 = 15.0 / 0.53;
         let lag = settle(LoopOrder::Second, 0.0, 10.0, PLL);
         // Steady error of a type-2 loop: rate / w^2.
@@ -163,7 +167,11 @@ mod tests {
     #[test]
     fn third_order_follows_a_constant_acceleration() {
         // 4 s are 40 time constants: only rounding is left.
-        assert_abs_diff_eq!(settle(LoopOrder::Third, 3.0, 50.0, PLL), 0.0, epsilon = 1e-7);
+        assert_abs_diff_eq!(
+            settle(LoopOrder::Third, 3.0, 50.0, PLL),
+            0.0,
+            epsilon = 1e-7
+        );
     }
 
     #[test]

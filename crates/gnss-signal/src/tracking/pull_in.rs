@@ -164,7 +164,9 @@ fn log_likelihood(running: &[Complex64], edge: usize, scale: f64) -> f64 {
 fn ln_bessel_i0(x: f64) -> f64 {
     if x < 3.75 {
         let t = (x / 3.75).powi(2);
-        let series = [3.5156229, 3.0899424, 1.2067492, 0.2659732, 0.0360768, 0.0045813];
+        let series = [
+            3.5156229, 3.0899424, 1.2067492, 0.2659732, 0.0360768, 0.0045813,
+        ];
         let tail = series.iter().rev().fold(0.0, |sum, c| (sum + c) * t);
         (1.0 + tail).ln()
     } else {

@@ -62,7 +62,11 @@ impl IdealSignal {
     /// The bit on the air: a fixed pattern.
     pub(super) fn bit_at(&self, t: f64) -> f64 {
         let k = (self.chips_at(t) / 20_460.0).floor() as u64;
-        if (k * 2_654_435_761) >> 13 & 1 == 1 { 1.0 } else { -1.0 }
+        if (k * 2_654_435_761) >> 13 & 1 == 1 {
+            1.0
+        } else {
+            -1.0
+        }
     }
 
     /// What acquisition would say, `code_error` chips and `doppler_error` off.
@@ -93,7 +97,11 @@ impl IdealSignal {
         let x = PI * length * (doppler_hz - replica.carrier_frequency_hz);
         let sinc = if x == 0.0 { 1.0 } else { x.sin() / x };
         let present = replica.signal == self.signal && middle < self.ends_s;
-        let snr = if present { cn0::ratio_hz(self.cn0_dbhz) * length } else { 0.0 };
+        let snr = if present {
+            cn0::ratio_hz(self.cn0_dbhz) * length
+        } else {
+            0.0
+        };
         let peak = snr.sqrt() * sinc * self.bit_at(middle);
         let offsets = replica.tap_offsets.as_slice();
         let noise = self.noise(offsets);
@@ -124,7 +132,10 @@ impl IdealSignal {
             })
             .collect();
         let walk_at = |point: f64| walks[points.partition_point(|p| *p < point)];
-        offsets.iter().map(|o| walk_at(o + 1.0) - walk_at(*o)).collect()
+        offsets
+            .iter()
+            .map(|o| walk_at(o + 1.0) - walk_at(*o))
+            .collect()
     }
 
     fn gauss(&mut self) -> f64 {

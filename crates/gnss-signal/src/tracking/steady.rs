@@ -152,7 +152,9 @@ impl Steady {
         let strong_enough = self.cn0_hz > limit;
         let patience_s = self.settings.patience_s;
         let before = self.lock;
-        self.lock = self.detector.update(prompt, strong_enough, interval_s, patience_s);
+        self.lock = self
+            .detector
+            .update(prompt, strong_enough, interval_s, patience_s);
         self.slipped |= self.lock != Lock::Carrier;
         if before == Lock::Carrier && self.lock != Lock::Carrier {
             self.code.widen(0.25 / self.settings.code_unlocked_hz);
@@ -209,7 +211,7 @@ impl Steady {
             code_period: at.code_period,
             code_phase_chips: at.code_phase_chips,
             periods_into_bit: Some(
-                (at.code_period - self.bit_edge).rem_euclid(bit_periods(&at)) as u8
+                (at.code_period - self.bit_edge).rem_euclid(bit_periods(&at)) as u8,
             ),
             code_variance_chips2: self.code_variance_chips2(),
             doppler_hz: sign * doppler_hz,
@@ -230,7 +232,10 @@ impl Steady {
     fn doppler(&mut self, tick: u64, frequency_error_hz: f64) -> (f64, f64) {
         let interval_s = self.interval_s();
         let snr = self.snr(interval_s);
-        let line = self.pre_filter.phase_line().filter(|_| self.lock == Lock::Carrier);
+        let line = self
+            .pre_filter
+            .phase_line()
+            .filter(|_| self.lock == Lock::Carrier);
         let Some(line) = line else {
             self.last_line = None;
             self.acceleration_hz_s = 0.0;

@@ -59,7 +59,7 @@ pub struct RunOptions {
     /// Troposphere model: saastamoinen or none [default: saastamoinen]
     #[arg(long, value_name = "MODEL")]
     pub troposphere: Option<String>,
-    /// Use no satellite below this elevation, 0 to 90 degrees [default: 5]
+    /// Use no satellite below this elevation, 0 to 90 degrees [default: 0, low ones weigh little]
     #[arg(long, value_name = "DEG", allow_hyphen_values = true)]
     pub elevation_mask: Option<f64>,
     /// Satellites to look for, for instance 1,7,20-25 [default: 1-32]

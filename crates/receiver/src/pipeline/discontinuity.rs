@@ -68,7 +68,9 @@ fn last_heard<B: CorrelatorBank>(
     let Some(first) = faded.iter().map(|(_, since)| *since).min() else {
         return Ok(None);
     };
-    let start = first.saturating_sub((10.0 * period) as u64).max(bank.oldest_tick());
+    let start = first
+        .saturating_sub((10.0 * period) as u64)
+        .max(bank.oldest_tick());
     let count = ((now - start) as f64 / period) as usize;
     let mut power = vec![0.0; count];
     let mut taps: Vec<Taps> = Vec::new();
@@ -79,7 +81,12 @@ fn last_heard<B: CorrelatorBank>(
         let replicas: Vec<Replica> = (0..count)
             .map(|k| {
                 let from = start + (k as f64 * period) as u64;
-                moved(&replica, from, from + period as u64, bank.front_end().sample_rate_hz)
+                moved(
+                    &replica,
+                    from,
+                    from + period as u64,
+                    bank.front_end().sample_rate_hz,
+                )
             })
             .collect();
         bank.correlate(&replicas, &mut taps)?;

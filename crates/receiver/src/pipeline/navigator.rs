@@ -110,6 +110,14 @@ impl Navigator {
         self.near
     }
 
+    /// The oscillator's part of every Doppler, Hz, once there was a fix at moderate speed.
+    pub(super) fn oscillator_doppler_hz(&self) -> Option<f64> {
+        let place = self
+            .place
+            .filter(|p| p.solved && p.velocity_ecef_mps.norm() < 200.0)?;
+        Some(-place.clock_drift_mps / L1_WAVELENGTH_M)
+    }
+
     /// Samples were lost or repeated: time is only roughly known from here on.
     pub(super) fn time_jumped(&mut self) {
         if let Some(clock) = &mut self.clock {
@@ -163,32 +171,43 @@ impl Navigator {
             }
             return self.result(tick, tracked, None);
         }
+        let mut navigated = self.least_squares(tick, tracked);
+        if trust == Some(ClockTrust::Message)
+            && let Some((solution, _)) = &navigated.fix
+        {
+            // The first fix sets the clock, and is made anew with it.
+            let bias_m = solution.clock_bias_m;
+            if let Some(clock) = &mut self.clock {
+                clock.correct(bias_m);
+            }
+            navigated = self.least_squares(tick, tracked);
+        }
+        if let Some((solution, _)) = &navigated.fix {
+            self.settle(tick, solution);
+        }
+        navigated
+    }
+
+    /// Solution of this epoch's pseudoranges and range rates alone.
+    fn least_squares(&self, tick: u64, tracked: &[Tracked]) -> Navigated {
         let (raw, formed) = self.measurements(tick, tracked);
-        let start = self.place.map_or_else(Vector3::zeros, |p| p.position_ecef_m);
+        let start = self
+            .place
+            .map_or_else(Vector3::zeros, |p| p.position_ecef_m);
         let solved = least_squares::solve_with_exclusion(
             &formed.measurements,
             &self.model(),
             &start,
             EXCLUSION_FALSE_ALARM,
         );
-        let fix = solved.ok().map(|mut solution| {
-            self.set_clock_by_fix(&mut solution);
-            self.settle(tick, &solution);
-            (solution, Source::LeastSquares)
-        });
         Navigated {
             receive_time: self.clock.map(|c| c.at(tick)),
-            fix,
+            fix: solved.ok().map(|s| (s, Source::LeastSquares)),
             raw,
         }
     }
 
-    fn result(
-        &self,
-        tick: u64,
-        tracked: &[Tracked],
-        fix: Option<(Solution, Source)>,
-    ) -> Navigated {
+    fn result(&self, tick: u64, tracked: &[Tracked], fix: Option<(Solution, Source)>) -> Navigated {
         let exact = self.clock.is_some_and(|c| c.trust == ClockTrust::Fix);
         let raw = if exact {
             self.measurements(tick, tracked).0
@@ -216,17 +235,6 @@ impl Navigator {
             let time = latest + TYPICAL_TRAVEL_S;
             let clock = ReceiverClock::new(tick, time, ClockTrust::Message, self.sample_rate_hz);
             self.clock = Some(clock);
-        }
-    }
-
-    /// After the first fix the clock is right.
-    fn set_clock_by_fix(&mut self, solution: &mut Solution) {
-        let Some(clock) = &mut self.clock else { return };
-        if clock.trust == ClockTrust::Message {
-            clock.correct(solution.clock_bias_m);
-            let bias_s = solution.clock_bias_m / SPEED_OF_LIGHT_MPS;
-            solution.receive_time = solution.receive_time - bias_s;
-            solution.clock_bias_m = 0.0;
         }
     }
 
@@ -312,7 +320,12 @@ impl Navigator {
             .filter(|t| matches!(t.epoch.lock, Lock::Code | Lock::Carrier))
             .filter_map(|t| {
                 let transmit_time = self.transmit_time(&clock, tick, t)?;
-                Some(raw_measurement(&t.epoch, t.slot.satellite, receive_time, transmit_time))
+                Some(raw_measurement(
+                    &t.epoch,
+                    t.slot.satellite,
+                    receive_time,
+                    transmit_time,
+                ))
             })
             .collect();
         let formed = form(receive_time, &raw, &self.store);

@@ -1,5 +1,7 @@
 //! How a run ended, and why it has no fix where it has none.
 
+use std::collections::BTreeMap;
+
 use gnss_nav::{EphemerisStore, GpsTime};
 use gnss_signal::tracking::Lock;
 
@@ -37,15 +39,20 @@ pub(super) fn why_no_fix(
             settings.doppler_half_width_hz / 1e3
         );
     }
-    let lacks: Vec<String> = slots
+    let mut by_lack: BTreeMap<String, Vec<String>> = BTreeMap::new();
+    for slot in slots.iter().filter(|s| s.announced) {
+        let satellites = by_lack.entry(lack(slot, store, near)).or_default();
+        satellites.push(slot.satellite.to_string());
+    }
+    let ready = by_lack.get(READY).map_or(0, Vec::len);
+    let list: Vec<String> = by_lack
         .iter()
-        .map(|slot| format!("{} {}", slot.satellite, lack(slot, store, near)))
+        .map(|(lack, satellites)| format!("{} {lack}", satellites.join(" ")))
         .collect();
-    let ready = lacks.iter().filter(|l| l.ends_with(READY)).count();
-    let list = if lacks.is_empty() {
+    let list = if list.is_empty() {
         "none is tracked at the end".to_owned()
     } else {
-        lacks.join(", ")
+        list.join("; ")
     };
     format!(
         "{acquired} satellites acquired, {ready} ready of the {NEEDED} that a fix needs after \
@@ -57,20 +64,25 @@ const READY: &str = "ready";
 
 fn lack(slot: &Slot, store: &EphemerisStore, near: Option<GpsTime>) -> String {
     let known = near.is_some_and(|t| store.select(slot.satellite, t).is_some());
-    match (slot.channel.lock(), slot.bits_found, slot.has_frame(), known) {
+    match (
+        slot.channel.lock(),
+        slot.bits_found,
+        slot.has_frame(),
+        known,
+    ) {
         (Lock::Lost, ..) => "lost".to_owned(),
-        (_, false, ..) => "lacks bit synchronisation".to_owned(),
-        (_, _, false, true) => "lacks the time of week".to_owned(),
-        (_, _, false, false) => "lacks frame synchronisation and an ephemeris".to_owned(),
+        (_, false, ..) => "without bit synchronisation".to_owned(),
+        (_, _, false, true) => "without the time of week".to_owned(),
+        (_, _, false, false) => "without frame synchronisation and an ephemeris".to_owned(),
         (.., false) => {
             let missing: Vec<String> = (1..=3)
                 .filter(|id| slot.subframes & (1 << (id - 1)) == 0)
                 .map(|id| id.to_string())
                 .collect();
             if missing.is_empty() {
-                "lacks an ephemeris (subframes disagree or have expired)".to_owned()
+                "without an ephemeris (subframes disagree or have expired)".to_owned()
             } else {
-                format!("lacks subframe {}", missing.join(" and "))
+                format!("without subframe {}", missing.join(" and "))
             }
         }
         _ => READY.to_owned(),

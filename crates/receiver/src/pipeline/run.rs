@@ -11,15 +11,23 @@ use super::discontinuity::{self, Jump};
 use super::navigator::{EXCLUSION_FALSE_ALARM, Navigator, Tracked};
 use super::outcome::{Outcome, why_no_fix};
 use super::report;
-use super::schedule::Schedule;
+use super::schedule::{DopplerRange, Schedule};
 use super::settings::Settings;
 use super::slot::{Decoded, Slot};
 use super::spectrum::SpectrumSense;
 use crate::ReceiverError;
 use crate::record::{Acquired, Event, EventKind, IonosphereUtcRecord, Record, TapsRecord};
 
+/// An acquisition this far above its threshold is reported at once; any other when the channel
+/// finds the data bits, which no chance peak has.
+const UNMISTAKABLE: f64 = 2.0;
+/// An acquisition not confirmed by the end of the samples is reported above this, dB-Hz: the
+/// least that acquisition finds.
+const STILL_THERE_DBHZ: f64 = 31.0;
 /// Samples brought in at a time, s: short enough to report promptly, long enough to be cheap.
 const STEP_S: f64 = 0.02;
+/// Doppler of satellites for a receiver slower than 200 m/s, Hz.
+const SATELLITE_DOPPLER_HZ: f64 = 6e3;
 /// A code that no satellite transmits, to listen to the noise.
 const NOISE_PRN: u8 = 37;
 
@@ -101,6 +109,7 @@ impl<B: CorrelatorBank> Run<'_, B> {
                 self.navigate(now)?;
             }
             if ended {
+                self.announce_rest(now)?;
                 return Ok(self.outcome(now));
             }
             step += u32::from(now == next_step);
@@ -175,7 +184,8 @@ impl<B: CorrelatorBank> Run<'_, B> {
         if wanted.is_empty() {
             return Ok(());
         }
-        for request in self.schedule.due(now, ended, &wanted, self.settings) {
+        let range = self.doppler_range();
+        for request in self.schedule.due(now, ended, &wanted, &range) {
             for hit in self.bank.search(&request)?.hits {
                 self.open(now, &hit)?;
             }
@@ -183,22 +193,65 @@ impl<B: CorrelatorBank> Run<'_, B> {
         Ok(())
     }
 
+    /// Where to look for a satellite of which nothing is known: after a fix the oscillator's part
+    /// of the Doppler is.
+    fn doppler_range(&self) -> DopplerRange {
+        let sign = self.tracking.spectrum.sign();
+        let oscillator_hz = self.navigator.oscillator_doppler_hz();
+        let settings = self.settings;
+        DopplerRange {
+            centre_hz: sign * oscillator_hz.unwrap_or(0.0),
+            half_width_hz: oscillator_hz.map_or(settings.doppler_half_width_hz, |_| {
+                SATELLITE_DOPPLER_HZ.min(settings.doppler_half_width_hz)
+            }),
+            false_alarm_probability: settings.false_alarm_probability,
+        }
+    }
+
     /// Opens a channel on a signal found.
     fn open(&mut self, now: u64, hit: &AcquisitionHit) -> Result<(), ReceiverError> {
         self.schedule.found(hit);
-        self.acquired.insert(hit.signal);
         let slot = self.slot(hit);
-        let satellite = slot.satellite;
         self.slots.push(slot);
         self.slots.sort_by_key(|s| s.satellite);
+        if hit.statistic > UNMISTAKABLE * hit.threshold {
+            self.announce(now, hit.signal)?;
+        }
+        Ok(())
+    }
+
+    /// Reports an acquisition, once.
+    fn announce(&mut self, now: u64, signal: SignalId) -> Result<(), ReceiverError> {
+        let same = |s: &&mut Slot| s.channel.signal() == signal && !s.announced;
+        let Some(slot) = self.slots.iter_mut().find(same) else {
+            return Ok(());
+        };
+        slot.announced = true;
+        let (satellite, hit) = (slot.satellite, slot.hit);
+        self.acquired.insert(signal);
         let acquired = Acquired {
             satellite,
             doppler_hz: hit.doppler_hz,
-            code_phase_chips: code_phase_at_first_sample(hit, self.front_end),
+            code_phase_chips: code_phase_at_first_sample(&hit, self.front_end),
             statistic: hit.statistic,
             cn0_dbhz: hit.cn0_dbhz,
         };
         self.emit(now, Some(satellite), EventKind::Acquired(acquired))
+    }
+
+    /// At the end, reports what was acquired and is still there.
+    fn announce_rest(&mut self, now: u64) -> Result<(), ReceiverError> {
+        let there = |slot: &mut Slot| {
+            let cn0_dbhz = slot.channel.epoch(now).map(|e| e.cn0_dbhz);
+            cn0_dbhz.is_none_or(|c| c > STILL_THERE_DBHZ)
+        };
+        let mut rest = Vec::new();
+        for slot in &mut self.slots {
+            if !slot.announced && there(slot) {
+                rest.push(slot.channel.signal());
+            }
+        }
+        rest.into_iter().try_for_each(|s| self.announce(now, s))
     }
 
     fn slot(&self, hit: &AcquisitionHit) -> Slot {
@@ -245,6 +298,7 @@ impl<B: CorrelatorBank> Run<'_, B> {
         }
         if let Some(sync) = update.bit_sync {
             self.spectrum.weigh(&sync);
+            self.announce(now, replica.signal)?;
             self.emit(now, Some(satellite), EventKind::BitSync)?;
         }
         if from != to {
@@ -319,8 +373,10 @@ impl<B: CorrelatorBank> Run<'_, B> {
     fn invert(&mut self, now: u64) -> Result<(), ReceiverError> {
         self.tracking.spectrum = Spectrum::Inverted;
         self.emit(now, None, EventKind::SpectrumInverted)?;
-        let hits: Vec<_> = self.slots.iter().map(|s| s.hit).collect();
-        self.slots = hits.iter().map(|hit| self.slot(hit)).collect();
+        let slots = self.slots.iter();
+        self.slots = slots
+            .map(|old| self.slot(&old.hit).succeeding(old))
+            .collect();
         self.track(now)
     }
 
@@ -334,9 +390,12 @@ impl<B: CorrelatorBank> Run<'_, B> {
         self.navigator.time_jumped();
         for hit in &jump.hits {
             let fresh = self.slot(hit);
-            let slot = self.slots.iter_mut().find(|s| s.satellite == fresh.satellite);
+            let slot = self
+                .slots
+                .iter_mut()
+                .find(|s| s.satellite == fresh.satellite);
             if let Some(slot) = slot {
-                *slot = fresh;
+                *slot = fresh.succeeding(slot);
             }
         }
         Ok(())

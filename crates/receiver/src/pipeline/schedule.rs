@@ -4,14 +4,12 @@ use std::collections::BTreeMap;
 
 use gnss_signal::{AcquisitionHit, SearchRequest, SignalId, default_search};
 
-use super::settings::Settings;
-
 /// First searches, from the first sample on, ms: short for what is strong, longer for the rest.
 const FIRST_SEARCHES_MS: [u32; 2] = [20, 60];
 /// Later searches for what is not tracked look at this much, ms, ...
 const LATER_SEARCH_MS: u32 = 60;
 /// ... this often, s: satellites rise and buildings end slowly.
-const LATER_PERIOD_S: f64 = 15.0;
+const LATER_PERIOD_S: f64 = 30.0;
 /// A signal lost is looked for this often, s, ...
 const LOST_PERIOD_S: f64 = 0.5;
 /// ... for this long, s, ...
@@ -27,6 +25,17 @@ pub(super) struct Schedule {
     next_later_s: f64,
     next_lost_s: f64,
     lost: BTreeMap<SignalId, Lost>,
+}
+
+/// Where to look for a satellite of which nothing is known.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct DopplerRange {
+    /// Middle, Hz.
+    pub(super) centre_hz: f64,
+    /// Half the width, Hz.
+    pub(super) half_width_hz: f64,
+    /// Probability that noise alone yields any acquisition in one search.
+    pub(super) false_alarm_probability: f64,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -67,17 +76,17 @@ impl Schedule {
         now: u64,
         ended: bool,
         wanted: &[SignalId],
-        settings: &Settings,
+        range: &DopplerRange,
     ) -> Vec<SearchRequest> {
         let now_s = now as f64 / self.sample_rate_hz;
         if let Some(ms) = self.first_due(now_s, ended) {
-            return vec![self.request(wanted.to_vec(), 0, ms, settings)];
+            return vec![self.request(wanted.to_vec(), 0, ms, range)];
         }
         let span = (f64::from(LATER_SEARCH_MS + 2) * 1e-3 * self.sample_rate_hz) as u64;
         let start = now.saturating_sub(span);
         if now_s >= self.next_later_s {
             self.next_later_s = now_s + LATER_PERIOD_S;
-            return vec![self.request(wanted.to_vec(), start, LATER_SEARCH_MS, settings)];
+            return vec![self.request(wanted.to_vec(), start, LATER_SEARCH_MS, range)];
         }
         if now_s < self.next_lost_s {
             return Vec::new();
@@ -88,7 +97,7 @@ impl Schedule {
         lost.map(|(signal, lost)| SearchRequest {
             doppler_centre_hz: lost.doppler_hz,
             doppler_half_width_hz: LOST_HALF_WIDTH_HZ,
-            ..self.request(vec![*signal], start, LATER_SEARCH_MS, settings)
+            ..self.request(vec![*signal], start, LATER_SEARCH_MS, range)
         })
         .collect()
     }
@@ -114,17 +123,17 @@ impl Schedule {
         signals: Vec<SignalId>,
         start_tick: u64,
         duration_ms: u32,
-        settings: &Settings,
+        range: &DopplerRange,
     ) -> SearchRequest {
         let (coherent_periods, noncoherent_sums) = default_search(duration_ms);
         SearchRequest {
             signals,
             start_tick,
-            doppler_centre_hz: 0.0,
-            doppler_half_width_hz: settings.doppler_half_width_hz,
+            doppler_centre_hz: range.centre_hz,
+            doppler_half_width_hz: range.half_width_hz,
             coherent_periods,
             noncoherent_sums,
-            false_alarm_probability: settings.false_alarm_probability,
+            false_alarm_probability: range.false_alarm_probability,
         }
     }
 }

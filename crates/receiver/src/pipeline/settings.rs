@@ -20,7 +20,7 @@ pub struct Settings {
     pub tracking: TrackingSettings,
     /// Navigation epochs per second.
     pub rate_hz: f64,
-    /// Satellites below are not used, rad.
+    /// Satellites below are not used, rad. Default 0: low ones weigh little by their own.
     pub elevation_mask_rad: f64,
     /// Whether the broadcast ionosphere model is applied where its parameters are known.
     pub ionosphere: bool,
@@ -57,7 +57,7 @@ impl Default for Settings {
             false_alarm_probability: 1e-3,
             tracking: TrackingSettings::default(),
             rate_hz: 10.0,
-            elevation_mask_rad: 5f64.to_radians(),
+            elevation_mask_rad: 0.0,
             ionosphere: true,
             troposphere: true,
             aiding: Aiding::default(),

@@ -7,7 +7,6 @@ use gnss_signal::tracking::{
 };
 use gnss_signal::{AcquisitionHit, FrontEnd, Replica, Signal, Taps};
 
-
 /// One satellite being received.
 #[derive(Debug, Clone)]
 pub(super) struct Slot {
@@ -20,6 +19,8 @@ pub(super) struct Slot {
     /// Subframes received with every word good since the channel began, bit 0 = subframe 1.
     pub(super) subframes: u8,
     pub(super) lock_reported: Lock,
+    /// Whether the acquisition was reported.
+    pub(super) announced: bool,
     pub(super) bits_found: bool,
     /// Cycles added to the carrier phase so that it agrees with the first pseudorange.
     phase_offset_cycles: Option<f64>,
@@ -52,9 +53,17 @@ impl Slot {
             frame: None,
             subframes: 0,
             lock_reported: Lock::PullIn,
+            announced: false,
             bits_found: false,
             phase_offset_cycles: None,
         }
+    }
+
+    /// This slot in place of `old`: what was reported of that one stays reported.
+    pub(super) const fn succeeding(mut self, old: &Self) -> Self {
+        self.announced = old.announced;
+        self.lock_reported = old.lock_reported;
+        self
     }
 
     /// Takes the sums of a replica; returns the channel's update and what its message says.
