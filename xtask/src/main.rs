@@ -5,8 +5,10 @@ use std::process::ExitCode;
 
 use anyhow::Result;
 use clap::{Parser, Subcommand};
+use xtask::ci::ci;
 use xtask::code_noise::{self, Experiment};
 use xtask::demo::demo;
+use xtask::tidy::{Severity, tidy, workspace_root};
 
 #[derive(Debug, Parser)]
 #[command(
@@ -45,6 +47,10 @@ enum Task {
         #[arg(long, value_name = "HZ")]
         code_bandwidth: Option<f64>,
     },
+    /// Check the layers, module comments and what no compiler checks.
+    Tidy,
+    /// Run every check of the tree, as .ci/run does.
+    Ci,
 }
 
 fn main() -> ExitCode {
@@ -58,17 +64,21 @@ fn main() -> ExitCode {
     }
 }
 
+const fn verdict(holds: bool) -> ExitCode {
+    if holds {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::FAILURE
+    }
+}
+
 fn perform(task: Task) -> Result<ExitCode> {
     let mut out = io::stdout().lock();
     match task {
         Task::Demo { seed } => {
             let demo = demo(seed)?;
             writeln!(out, "{demo}")?;
-            Ok(if demo.holds() {
-                ExitCode::SUCCESS
-            } else {
-                ExitCode::FAILURE
-            })
+            Ok(verdict(demo.holds()))
         }
         Task::CodeNoise {
             cn0,
@@ -91,5 +101,22 @@ fn perform(task: Task) -> Result<ExitCode> {
             writeln!(out, "{}", code_noise::table(&experiment)?)?;
             Ok(ExitCode::SUCCESS)
         }
+        Task::Tidy => {
+            let findings = tidy(&workspace_root())?;
+            for finding in &findings {
+                writeln!(out, "{finding}")?;
+            }
+            let errors = findings
+                .iter()
+                .filter(|f| f.severity == Severity::Error)
+                .count();
+            writeln!(
+                out,
+                "tidy: {errors} errors, {} warnings",
+                findings.len() - errors
+            )?;
+            Ok(verdict(errors == 0))
+        }
+        Task::Ci => Ok(verdict(ci(&workspace_root())?)),
     }
 }
