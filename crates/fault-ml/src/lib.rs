@@ -1,1 +1,55 @@
 //! Monitors that decide whether a channel is to be believed. Plain numbers in, verdicts out.
+//!
+//! A [`ChannelMonitor`] watches one channel, step by step; an [`IntegrityMonitor`] judges one epoch
+//! of all satellites. Both state a score and the threshold it is held against: faulty is exactly
+//! a score above its threshold. What to do about it is for others to decide.
+//!
+//! This version holds the traits and the values that cross them; it has no monitor of its own yet.
+//!
+//! ```
+//! use fault_ml::{Cadence, ChannelMonitor, ChannelVerdict, Innovation, Judgement, MonitorError};
+//!
+//! /// Holds a code innovation against a fixed multiple of its standard deviation.
+//! struct FixedLimit {
+//!     sigmas: f64,
+//! }
+//!
+//! impl ChannelMonitor for FixedLimit {
+//!     type Input = Innovation;
+//!
+//!     fn name(&self) -> &str {
+//!         "fixed-limit"
+//!     }
+//!
+//!     fn cadence(&self) -> Cadence {
+//!         Cadence::NavigationEpoch
+//!     }
+//!
+//!     fn step(&mut self, input: &Innovation) -> Result<ChannelVerdict, MonitorError> {
+//!         let score = (input.code_m / input.code_sigma_m).abs();
+//!         Ok(ChannelVerdict::Judged(Judgement::new(score, self.sigmas)?))
+//!     }
+//!
+//!     fn reset(&mut self) {}
+//! }
+//!
+//! let mut monitor = FixedLimit { sigmas: 5.0 };
+//! let innovation = Innovation {
+//!     code_m: 31.0,
+//!     code_sigma_m: 4.0,
+//!     rate_mps: 0.1,
+//!     rate_sigma_mps: 0.2,
+//! };
+//! assert!(monitor.step(&innovation)?.is_faulty());
+//! # Ok::<(), MonitorError>(())
+//! ```
+
+mod channel;
+mod error;
+mod integrity;
+mod judgement;
+
+pub use channel::{Cadence, ChannelMonitor, ChannelVerdict, Innovation};
+pub use error::MonitorError;
+pub use integrity::{IntegrityMonitor, IntegrityReport, SatelliteMeasurement};
+pub use judgement::{Health, Judgement};
