@@ -1,6 +1,5 @@
 //! `receiver acquire`.
 
-use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::io::Write;
 
@@ -18,8 +17,8 @@ use crate::record::Acquired;
 use crate::samples::{self, Source};
 use crate::summary::AcquiredSatellite;
 
-/// Signal used by the stages, ms: a short one for what is strong, a longer one for the rest.
-const STAGES_MS: [u32; 2] = [20, 60];
+/// Signal used, ms: as much as `run` looks at first.
+const SIGNAL_MS: u32 = 60;
 /// Probability that noise alone yields any satellite in the whole command.
 const FALSE_ALARM_PROBABILITY: f64 = 1e-3;
 
@@ -30,7 +29,7 @@ pub(super) fn acquire(options: &AcquireOptions, out: &mut dyn Write) -> Result<(
         ReceiverError::Signal(error) => samples::in_recording(&config.recording.input, error),
         other => other,
     })?;
-    let acquired: Vec<AcquiredSatellite> = found.hits.values().map(satellite).collect();
+    let acquired: Vec<AcquiredSatellite> = found.hits.iter().map(satellite).collect();
     if config.json {
         print(out, &format!("{}\n", json!({ "acquired": acquired })))
     } else if acquired.is_empty() {
@@ -41,67 +40,45 @@ pub(super) fn acquire(options: &AcquireOptions, out: &mut dyn Write) -> Result<(
 }
 
 struct Found {
-    hits: BTreeMap<SignalId, AcquisitionHit>,
+    hits: Vec<AcquisitionHit>,
     signal_ms: u32,
     best_missed: Option<(SignalId, f64, f64)>,
 }
 
 fn search(source: Source, config: &AcquireConfig) -> Result<Found, ReceiverError> {
-    let stages = match config.integration_ms {
-        Some(ms) => vec![ms],
-        None => STAGES_MS.to_vec(),
-    };
-    let longest_ms = stages.iter().copied().max().unwrap_or(1);
-    let history_s = f64::from(longest_ms + 2) * 1e-3;
+    let wanted_ms = config.integration_ms.unwrap_or(SIGNAL_MS);
+    let history_s = f64::from(wanted_ms + 2) * 1e-3;
     let mut bank = IfCorrelatorBank::new(source, history_s, InstructionSet::detect())?
         .with_search_threads(config.threads);
     let ticks_per_ms = bank.front_end().sample_rate_hz * 1e-3;
-    let mut missing: Vec<SignalId> = config
-        .prns
-        .iter()
-        .map(|prn| SignalId::gps_l1_ca(*prn))
-        .collect::<Result<_, _>>()?;
-    let mut found = Found {
-        hits: BTreeMap::new(),
-        signal_ms: 0,
-        best_missed: None,
-    };
-    for stage_ms in &stages {
-        let wanted = (f64::from(*stage_ms) * ticks_per_ms).ceil() as u64;
-        let held = bank.advance_to(wanted)?;
-        if held == 0 {
-            return Err(samples::empty(&config.recording.input));
-        }
-        // A last period that lacks a twentieth is taken for whole.
-        let available_ms = (held as f64 / ticks_per_ms + 0.05) as u32;
-        let used_ms = available_ms.min(*stage_ms);
-        if used_ms <= found.signal_ms || missing.is_empty() {
-            break;
-        }
-        let (coherent_periods, noncoherent_sums) = plan(used_ms);
-        let report = bank.search(&SearchRequest {
-            signals: missing.clone(),
-            start_tick: 0,
-            doppler_centre_hz: 0.0,
-            doppler_half_width_hz: config.doppler_max_hz,
-            coherent_periods,
-            noncoherent_sums,
-            false_alarm_probability: FALSE_ALARM_PROBABILITY / stages.len() as f64,
-        })?;
-        found.signal_ms = used_ms;
-        found.best_missed = report.best_missed.map(|(id, s)| (id, s, report.threshold));
-        missing.retain(|signal| report.hits.iter().all(|hit| hit.signal != *signal));
-        found
-            .hits
-            .extend(report.hits.into_iter().map(|hit| (hit.signal, hit)));
+    let held = bank.advance_to((f64::from(wanted_ms) * ticks_per_ms).ceil() as u64)?;
+    if held == 0 {
+        return Err(samples::empty(&config.recording.input));
     }
-    if found.signal_ms == 0 {
+    // A last period that lacks a twentieth is taken for whole.
+    let signal_ms = ((held as f64 / ticks_per_ms + 0.05) as u32).min(wanted_ms);
+    if signal_ms == 0 {
         return Err(ReceiverError::Content {
             path: config.recording.input.to_string().into(),
             what: "less than 1 ms of samples: expected a code period at least".to_owned(),
         });
     }
-    Ok(found)
+    let (coherent_periods, noncoherent_sums) = plan(signal_ms);
+    let signals = config.prns.iter().map(|prn| SignalId::gps_l1_ca(*prn));
+    let report = bank.search(&SearchRequest {
+        signals: signals.collect::<Result<_, _>>()?,
+        start_tick: 0,
+        doppler_centre_hz: 0.0,
+        doppler_half_width_hz: config.doppler_max_hz,
+        coherent_periods,
+        noncoherent_sums,
+        false_alarm_probability: FALSE_ALARM_PROBABILITY,
+    })?;
+    Ok(Found {
+        best_missed: report.best_missed.map(|(id, s)| (id, s, report.threshold)),
+        hits: report.hits,
+        signal_ms,
+    })
 }
 
 /// Coherent periods and non-coherent sums for so many milliseconds.

@@ -182,8 +182,11 @@ impl Navigator {
             }
             navigated = self.least_squares(tick, tracked);
         }
-        if let Some((solution, _)) = &navigated.fix {
-            self.settle(tick, solution);
+        match &navigated.fix {
+            Some((solution, _)) => self.settle(tick, solution),
+            // Before the first fix the clock is not good enough to report pseudoranges.
+            None if trust != Some(ClockTrust::Fix) => return self.result(tick, tracked, None),
+            None => {}
         }
         navigated
     }

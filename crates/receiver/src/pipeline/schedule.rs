@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use gnss_signal::{AcquisitionHit, SearchRequest, SignalId, default_search};
 
-/// First searches, from the first sample on, ms: short for what is strong, longer for the rest.
-const FIRST_SEARCHES_MS: [u32; 2] = [20, 60];
+/// The first search looks at this much from the first sample on, ms: enough for 33 dB-Hz.
+const FIRST_SEARCH_MS: u32 = 60;
 /// Later searches for what is not tracked look at this much, ms, ...
 const LATER_SEARCH_MS: u32 = 60;
 /// ... this often, s: satellites rise and buildings end slowly.
@@ -21,7 +21,7 @@ const LOST_HALF_WIDTH_HZ: f64 = 500.0;
 #[derive(Debug)]
 pub(super) struct Schedule {
     sample_rate_hz: f64,
-    next_first: usize,
+    searched: bool,
     next_later_s: f64,
     next_lost_s: f64,
     lost: BTreeMap<SignalId, Lost>,
@@ -48,7 +48,7 @@ impl Schedule {
     pub(super) fn new(sample_rate_hz: f64) -> Self {
         Self {
             sample_rate_hz,
-            next_first: 0,
+            searched: false,
             next_later_s: LATER_PERIOD_S,
             next_lost_s: 0.0,
             lost: BTreeMap::new(),
@@ -102,20 +102,16 @@ impl Schedule {
         .collect()
     }
 
-    /// Milliseconds of the first search due; at the end of short samples, as many as there are.
+    /// Milliseconds of the first search where it is due; at the end of short samples, as many as
+    /// there are.
     fn first_due(&mut self, now_s: f64, ended: bool) -> Option<u32> {
-        let due = *FIRST_SEARCHES_MS.get(self.next_first)?;
-        // One millisecond more: code periods do not begin at the first sample.
-        let held_ms = ((now_s * 1e3) as u32).saturating_sub(1);
-        if held_ms >= due {
-            self.next_first += 1;
-            Some(due)
-        } else if ended && held_ms > 0 {
-            self.next_first = FIRST_SEARCHES_MS.len();
-            Some(held_ms)
-        } else {
-            None
+        if self.searched {
+            return None;
         }
+        // A last period that lacks a twentieth is taken for whole.
+        let held_ms = (now_s * 1e3 + 0.05) as u32;
+        self.searched = held_ms >= FIRST_SEARCH_MS || (ended && held_ms > 0);
+        self.searched.then_some(held_ms.min(FIRST_SEARCH_MS))
     }
 
     fn request(
