@@ -1,4 +1,5 @@
 //! 107 ms of real signal received in flight: a coarse-time fix.
+#![allow(clippy::unwrap_used, reason = "a failure here is a failed test")]
 
 use end_to_end_tests::{FLIGHT, number, receive, test_data};
 

@@ -1,4 +1,5 @@
 //! Real recordings: what is acquired, and how it is tracked.
+#![allow(clippy::unwrap_used, reason = "a failure here is a failed test")]
 
 use std::collections::BTreeSet;
 

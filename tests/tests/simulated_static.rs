@@ -1,4 +1,5 @@
 //! 90 s of a static receiver, made by an independent simulator: stand-alone and assisted.
+#![allow(clippy::unwrap_used, reason = "a failure here is a failed test")]
 
 use std::path::Path;
 use std::process::Command;

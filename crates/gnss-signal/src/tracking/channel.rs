@@ -206,27 +206,24 @@ impl Channel {
         if periods < LEAST_PERIODS || periods % LOOK_PERIODS != 0 {
             return ChannelUpdate::default();
         }
-        let estimate = p.estimate(&self.settings);
         let lowest = cn0::ratio_hz(self.settings.lowest_cn0_dbhz);
-        match estimate {
-            Some(found) if found.bit_edge.is_some() && found.cn0_hz > lowest => {
-                let steady = p.steady(&found, self.settings);
-                let sync = p.bit_sync(&found, self.settings.spacing_chips);
-                self.stage = Stage::Steady(Box::new(steady));
-                return ChannelUpdate {
-                    bit: None,
-                    bit_sync: Some(sync),
-                };
+        let Some(found) = p.estimate(&self.settings).filter(|f| f.cn0_hz > lowest) else {
+            if periods >= JUDGE_PERIODS {
+                self.stage = Stage::Lost(p.nco.signal, p.nco.doppler_hz);
             }
-            Some(found) if found.cn0_hz > lowest => {
-                if periods >= self.settings.longest_pull_in_periods as usize {
-                    p.restart(&found);
-                }
-            }
-            _ if periods >= JUDGE_PERIODS => {
-                self.stage = Stage::Lost(p.nco.signal, p.nco.doppler_hz)
-            }
-            _ => {}
+            return ChannelUpdate::default();
+        };
+        if found.bit_edge.is_some() {
+            let steady = p.steady(&found, self.settings);
+            let sync = p.bit_sync(&found, self.settings.spacing_chips);
+            self.stage = Stage::Steady(Box::new(steady));
+            return ChannelUpdate {
+                bit: None,
+                bit_sync: Some(sync),
+            };
+        }
+        if periods >= self.settings.longest_pull_in_periods as usize {
+            p.restart(&found);
         }
         ChannelUpdate::default()
     }

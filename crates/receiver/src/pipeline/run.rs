@@ -61,7 +61,7 @@ pub fn run<B: CorrelatorBank>(
         channel_steps: 0,
         steps: 0,
     };
-    run.to_the_end()
+    run.until_the_end()
 }
 
 /// Whether there is a solution.
@@ -93,7 +93,7 @@ struct Run<'a, B> {
 }
 
 impl<B: CorrelatorBank> Run<'_, B> {
-    fn to_the_end(&mut self) -> Result<Outcome, ReceiverError> {
+    fn until_the_end(&mut self) -> Result<Outcome, ReceiverError> {
         let (mut step, mut epoch) = (1, 1);
         let last = self.settings.duration_s.map_or(u64::MAX, |s| self.tick(s));
         loop {
