@@ -43,6 +43,7 @@
 //! assert!(monitor.step(&innovation)?.is_faulty());
 //! # Ok::<(), MonitorError>(())
 //! ```
+#![cfg_attr(doctest, doc = include_str!("../README.md"))]
 
 mod channel;
 mod error;

@@ -1,4 +1,6 @@
 //! GNSS navigation: LNAV, orbits, frames, measurements, least squares. Never sees a sample.
+//!
+#![doc = include_str!("../README.md")]
 
 pub mod atmosphere;
 mod calendar;

@@ -1,5 +1,7 @@
 //! GNSS signal processing: samples to correlator sums to discriminators; acquisition and scalar
 //! tracking. Knows no position.
+//!
+#![doc = include_str!("../README.md")]
 
 mod acquisition;
 mod bank;

@@ -1,4 +1,6 @@
 //! GPS software receiver: samples in, positions and verdicts out.
+//!
+#![doc = include_str!("../README.md")]
 
 pub mod cli;
 pub mod config;
