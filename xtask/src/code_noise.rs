@@ -17,6 +17,8 @@ use crate::synthesis::{Message, Scene, SceneSignal, SignalPath, Synthesiser, Uni
 
 /// Rates compared, Hz: 4 and 16 samples a chip exactly, beside rates next to them.
 pub const RATES_HZ: [f64; 4] = [4.0e6, 4.092e6, 16.368e6, 16.369e6];
+/// Each rate with an integer number of samples per chip, with the rate it is held against.
+const INTEGER_AND_BESIDE_HZ: [(f64, f64); 2] = [(4.092e6, 4.0e6), (16.368e6, 16.369e6)];
 /// Dopplers, Hz: nearly no code Doppler, and the usual.
 pub const DOPPLERS_HZ: [f64; 2] = [20.0, 1000.0];
 /// Front ends: two-sided bandwidth over the sample rate.
@@ -260,6 +262,30 @@ pub fn table(experiment: &Experiment) -> Result<Table> {
     Ok(Table(all))
 }
 
+impl Table {
+    /// The largest ratio, behind `bandwidth`, of the rms error at a rate with an integer number of
+    /// samples per chip to that at the rate next to it, at the same Doppler.
+    #[must_use]
+    pub fn worst_ratio(&self, bandwidth: Option<f64>) -> Option<f64> {
+        let rms = |sample_rate_hz, doppler_hz| {
+            let case = Case {
+                sample_rate_hz,
+                bandwidth,
+                doppler_hz,
+            };
+            let row = self.0.iter().find(|(c, _)| *c == case);
+            row.map(|(_, error)| error.rms_chips)
+        };
+        let ratio = |integer_hz, beside_hz, doppler_hz| {
+            Some(rms(integer_hz, doppler_hz)? / rms(beside_hz, doppler_hz)?)
+        };
+        let ratios = DOPPLERS_HZ.iter().flat_map(|&doppler_hz| {
+            INTEGER_AND_BESIDE_HZ.map(|(integer, beside)| ratio(integer, beside, doppler_hz))
+        });
+        ratios.flatten().max_by(f64::total_cmp)
+    }
+}
+
 impl fmt::Display for Table {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         const CHIP_M: f64 = 299_792_458.0 / 1.023e6;
@@ -283,6 +309,71 @@ impl fmt::Display for Table {
                 error.epochs
             )?;
         }
+        for bandwidth in BANDWIDTHS {
+            if let Some(ratio) = self.worst_ratio(bandwidth) {
+                let filter = bandwidth.map_or("no filter".to_owned(), |b| format!("{b} fs"));
+                write!(
+                    f,
+                    "\n{filter}: integer samples per chip over the rate beside: at most {ratio:.2}"
+                )?;
+            }
+        }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_code_error_is_what_the_channel_states() {
+        // A wide loop, so that a short run holds many independent errors: 2 runs of 5 s at 5 Hz,
+        // one in 0.1 s.
+        let mut experiment = Experiment {
+            settle_s: 2.0,
+            judged_s: 5.0,
+            seeds: 2,
+            ..Experiment::default()
+        };
+        experiment.tracking.code_locked_hz = 5.0;
+        experiment.tracking.code_unlocked_hz = 5.0;
+        let case = Case {
+            sample_rate_hz: 4.0e6,
+            bandwidth: Some(0.8),
+            doppler_hz: 1000.0,
+        };
+        let error = measure(&experiment, case).unwrap();
+        // 100 errors tell the rms to 7 %, the mean to a tenth of it.
+        let ratio = error.rms_chips / error.stated_chips;
+        assert!((0.7..1.4).contains(&ratio), "{error:?}");
+        assert!(error.mean_chips.abs() < 0.5 * error.rms_chips, "{error:?}");
+    }
+
+    #[test]
+    fn ratios_pair_each_integer_rate_with_its_neighbour() {
+        let row = |sample_rate_hz, rms_chips| {
+            let case = Case {
+                sample_rate_hz,
+                bandwidth: None,
+                doppler_hz: 20.0,
+            };
+            let error = CodeError {
+                rms_chips,
+                mean_chips: 0.0,
+                stated_chips: 0.0,
+                epochs: 1,
+            };
+            (case, error)
+        };
+        let rows = vec![
+            row(4.0e6, 1.0),
+            row(4.092e6, 3.0),
+            row(16.368e6, 1.0),
+            row(16.369e6, 2.0),
+        ];
+        let table = Table(rows);
+        assert_eq!(table.worst_ratio(None), Some(3.0));
+        assert_eq!(table.worst_ratio(Some(0.8)), None);
     }
 }

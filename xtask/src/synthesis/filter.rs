@@ -7,6 +7,9 @@ use super::baseband::Planes;
 /// Taps on either side of the middle one; the transition is 3.3 / 65 of the sample rate wide.
 pub(super) const HALF_TAPS: usize = 32;
 
+/// Samples filtered at a time.
+const TILE: usize = 256;
+
 /// A windowed-sinc low-pass (Hamming) with unit gain at zero frequency.
 #[derive(Debug, Clone)]
 pub(super) struct LowPass {
@@ -58,13 +61,23 @@ fn filter_plane(
     history.extend_from_slice(&plane[..samples]);
     let out = &mut plane[..samples];
     let middle = &history[HALF_TAPS..];
-    for (out, x) in out.iter_mut().zip(middle) {
-        *out = taps[0] * x;
-    }
-    for (k, tap) in taps.iter().enumerate().skip(1) {
-        let (before, after) = (&history[HALF_TAPS - k..], &history[HALF_TAPS + k..]);
-        for ((out, a), b) in out.iter_mut().zip(before).zip(after) {
-            *out += tap * (a + b);
+    // A tile stays in registers or the nearest cache while all taps pass over it.
+    for (at, out) in out
+        .chunks_mut(TILE)
+        .enumerate()
+        .map(|(n, tile)| (n * TILE, tile))
+    {
+        for (out, x) in out.iter_mut().zip(&middle[at..]) {
+            *out = taps[0] * x;
+        }
+        for (k, tap) in taps.iter().enumerate().skip(1) {
+            let (before, after) = (
+                &history[at + HALF_TAPS - k..],
+                &history[at + HALF_TAPS + k..],
+            );
+            for ((out, a), b) in out.iter_mut().zip(before).zip(after) {
+                *out += tap * (a + b);
+            }
         }
     }
     history.drain(..samples);

@@ -95,7 +95,10 @@ fn refusal(package: &Package, allowed: &[&str], dependency: &Dependency) -> Opti
 mod tests {
     use super::*;
 
-    fn findings(packages: &[(&str, &[(&str, Option<&str>)])]) -> Vec<String> {
+    /// A package and its dependencies with their kinds.
+    type Sketch<'a> = (&'a str, &'a [(&'a str, Option<&'a str>)]);
+
+    fn findings(packages: &[Sketch]) -> Vec<String> {
         let packages: Vec<_> = packages
             .iter()
             .map(|(name, dependencies)| {
