@@ -34,8 +34,12 @@ impl InstructionSet {
     pub fn is_supported(self) -> bool {
         match self {
             Self::Reference | Self::Portable => true,
+            #[cfg(target_arch = "x86_64")]
             Self::Avx2 => super::avx2::is_supported(),
+            #[cfg(target_arch = "x86_64")]
             Self::Avx512 => super::avx512::is_supported(),
+            #[cfg(not(target_arch = "x86_64"))]
+            Self::Avx2 | Self::Avx512 => false,
         }
     }
 

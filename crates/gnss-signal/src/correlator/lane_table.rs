@@ -87,6 +87,10 @@ impl LaneTable {
     }
 
     /// From which chip, counted from that of sample 0, byte `byte` of a row counts.
+    #[cfg_attr(
+        not(target_arch = "x86_64"),
+        allow(dead_code, reason = "only vector look-ups count from several origins")
+    )]
     pub(super) fn origin_chips(&self, byte: usize) -> usize {
         self.origins.get(byte).map_or(0, |&chips| chips.into())
     }

@@ -5,7 +5,7 @@
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
-
+#[cfg(target_arch = "x86_64")]
 mod avx512;
 mod carrier_table;
 mod code_bits;
@@ -41,7 +41,9 @@ pub struct Correlator {
 enum Kernel {
     Reference,
     Portable(Box<FixedPoint<portable::Portable>>),
+    #[cfg(target_arch = "x86_64")]
     Avx2(Box<FixedPoint<avx2::Avx2>>),
+    #[cfg(target_arch = "x86_64")]
     Avx512(Box<FixedPoint<avx512::Avx512>>),
 }
 
@@ -64,11 +66,16 @@ impl Correlator {
         let kernel = match instruction_set {
             InstructionSet::Reference => Kernel::Reference,
             InstructionSet::Portable => portable_kernel(),
+            #[cfg(target_arch = "x86_64")]
             InstructionSet::Avx2 => Kernel::Avx2(FixedPoint::boxed(avx2::Avx2::new()?)),
+            #[cfg(target_arch = "x86_64")]
             InstructionSet::Avx512 => Kernel::Avx512(FixedPoint::boxed(avx512::Avx512::new()?)),
+            #[cfg(not(target_arch = "x86_64"))]
+            other => return Err(other.unsupported()),
         };
         let kernel = match kernel {
             _ if sample_rate_hz < fixed_point::LOWEST_SAMPLE_RATE_HZ => Kernel::Reference,
+            #[cfg(target_arch = "x86_64")]
             Kernel::Avx2(_) if sample_rate_hz < avx2::LOWEST_SAMPLE_RATE_HZ => portable_kernel(),
             kernel => kernel,
         };
@@ -95,7 +102,9 @@ impl Correlator {
         match &mut self.kernel {
             Kernel::Reference => reference::correlate(self.front_end, samples, replica, sums),
             Kernel::Portable(kernel) => kernel.correlate(&interval, sums),
+            #[cfg(target_arch = "x86_64")]
             Kernel::Avx2(kernel) => kernel.correlate(&interval, sums),
+            #[cfg(target_arch = "x86_64")]
             Kernel::Avx512(kernel) => kernel.correlate(&interval, sums),
         }
         let count = samples.len() / interval.components();
