@@ -85,6 +85,7 @@ impl Channel {
             carrier_phase_cycles: 0.0,
             doppler_cycles: 0.0,
             doppler_hz: hit.doppler_hz,
+            code_slip_hz: 0.0,
         };
         start.shift_code(hit.code_phase_chips);
         if start.code_phase_chips > 0.0 {
@@ -273,8 +274,9 @@ impl PullIn {
             nco.advance_to(nco.tick_of_period(edge));
         }
         nco.doppler_cycles = 0.0;
-        let averaged_s = self.stretch.len() as f64 * self.period_s();
-        Steady::new(nco, settings, found.cn0_hz, averaged_s)
+        let length_s = self.stretch.len() as f64 * self.period_s();
+        let variance = code_variance_chips2(found.cn0_hz, length_s, settings.spacing_chips);
+        Steady::new(nco, settings, found.cn0_hz, variance)
     }
 
     fn bit_sync(&self, found: &PullInEstimate, spacing_chips: f64) -> BitSync {

@@ -79,47 +79,105 @@ impl CarrierLoop {
     }
 }
 
-/// A carrier-aided code loop of first order whose bandwidth narrows with time.
+/// A carrier-aided code loop: a Kalman filter of code phase and of the rate at which the code
+/// slips against its carrier, whose gains never fall below those of a final bandwidth.
 ///
-/// The carrier removes the dynamics, so the loop only averages noise: its gain follows 1/n (the
-/// running mean) until it reaches the gain of the final bandwidth.
+/// The carrier removes the dynamics. What slips is what carrier and code do not share: the error
+/// of a nominal intermediate frequency (300 Hz are 0.2 chips/s), ionospheric divergence.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CodeLoop {
-    age_s: f64,
-    noise_per_s: f64,
+    slip_hz: f64,
+    /// Variances of phase (chips^2) and slip ((chips/s)^2), and their covariance.
+    phase: f64,
+    slip: f64,
+    both: f64,
+    /// Sliding mean of code errors over their deviation.
+    surprise: f64,
 }
 
+/// Deviation of the slip at first, chips/s (15 Hz of carrier): oscillators mostly share a clock.
+const SLIP_SIGMA_HZ: f64 = 0.01;
+/// Deviation of the slip once the errors deny that, chips/s (450 Hz of carrier).
+const FREE_SLIP_SIGMA_HZ: f64 = 0.3;
+/// Code errors over their deviation are averaged over so many intervals ...
+const SURPRISE_INTERVALS: f64 = 50.0;
+/// ... and deny what is assumed above this mean, five of its deviations.
+const SURPRISE: f64 = 0.5;
+
 impl CodeLoop {
-    /// A loop whose code phase is the mean of `age_s` so far.
+    /// A loop whose code phase has a variance of `variance_chips2`.
     #[must_use]
-    pub const fn new(age_s: f64) -> Self {
+    pub const fn new(variance_chips2: f64) -> Self {
         Self {
-            age_s,
-            noise_per_s: 1.0 / age_s,
+            slip_hz: 0.0,
+            phase: variance_chips2,
+            slip: SLIP_SIGMA_HZ * SLIP_SIGMA_HZ,
+            both: 0.0,
+            surprise: 0.0,
         }
     }
 
-    /// Takes the code error of an interval and returns the correction of the code phase, chips.
-    pub fn update(&mut self, error_chips: f64, final_bandwidth_hz: f64, interval_s: f64) -> f64 {
-        self.age_s += interval_s;
-        // First-order loop: gain = 4 * bandwidth * interval.
-        let gain = (4.0 * final_bandwidth_hz * interval_s)
-            .max(interval_s / self.age_s)
-            .min(1.0);
-        self.noise_per_s = (1.0 - gain).powi(2) * self.noise_per_s + gain * gain / interval_s;
-        gain * error_chips
+    /// Takes the code error of an interval, chips, over which the replica slipped at
+    /// [`CodeLoop::slip_hz`], and its variance; returns the correction of the code phase, chips.
+    pub fn update(
+        &mut self,
+        error_chips: f64,
+        variance_chips2: f64,
+        final_bandwidth_hz: f64,
+        interval_s: f64,
+    ) -> f64 {
+        self.phase += interval_s * (2.0 * self.both + interval_s * self.slip);
+        self.both += interval_s * self.slip;
+        // The floor: a loop of second order, damped by 1, of that one-sided bandwidth
+        // (B = 5/8 w, phase gain 2 w T).
+        let floor = (3.2 * final_bandwidth_hz * interval_s).min(1.0);
+        self.doubt(error_chips / variance_chips2.sqrt(), variance_chips2);
+        let total = self.phase + variance_chips2;
+        let phase_gain = (self.phase / total).max(floor);
+        let slip_gain = (self.both / total).max(floor * floor / 4.0 / interval_s);
+        self.reduce(phase_gain, slip_gain, variance_chips2);
+        self.slip_hz += slip_gain * error_chips;
+        phase_gain * error_chips
     }
 
-    /// Starts to average anew, from a mean of `age_s`.
-    pub const fn widen(&mut self, age_s: f64) {
-        *self = Self::new(age_s);
+    /// Frees the slip where the errors keep to one side.
+    fn doubt(&mut self, error: f64, variance: f64) {
+        self.surprise += (error - self.surprise) / SURPRISE_INTERVALS;
+        if self.surprise.abs() > SURPRISE {
+            self.phase += self.surprise * self.surprise * variance;
+            self.slip = FREE_SLIP_SIGMA_HZ * FREE_SLIP_SIGMA_HZ;
+            self.both = 0.0;
+            self.surprise = 0.0;
+        }
     }
 
-    /// Variance of the code phase over the variance of the code error times its interval, 1/s:
-    /// 2 * bandwidth once the loop is settled.
+    /// Covariance after an update with any gain (Joseph's form).
+    fn reduce(&mut self, phase_gain: f64, slip_gain: f64, variance: f64) {
+        let (p, b, s) = (self.phase, self.both, self.slip);
+        let keep = 1.0 - phase_gain;
+        self.phase = keep * keep * p + phase_gain * phase_gain * variance;
+        self.both = keep * (b - slip_gain * p) + phase_gain * slip_gain * variance;
+        self.slip = s - 2.0 * slip_gain * b + slip_gain * slip_gain * (p + variance);
+    }
+
+    /// Forgets what it knew to better than `variance_chips2` and the first slip.
+    pub const fn widen(&mut self, variance_chips2: f64) {
+        *self = Self {
+            slip_hz: self.slip_hz,
+            ..Self::new(variance_chips2)
+        };
+    }
+
+    /// Code rate of the signal over the one that belongs to its carrier, chips/s.
     #[must_use]
-    pub const fn noise_per_s(&self) -> f64 {
-        self.noise_per_s
+    pub const fn slip_hz(&self) -> f64 {
+        self.slip_hz
+    }
+
+    /// Variance of the code phase, chips^2.
+    #[must_use]
+    pub const fn variance_chips2(&self) -> f64 {
+        self.phase
     }
 }
 
@@ -193,20 +251,41 @@ mod tests {
     }
 
     #[test]
-    fn code_loop_is_a_mean_until_its_final_bandwidth() {
-        let mut filter = CodeLoop::new(1e-12);
-        let mut phase = 0.0;
-        let offsets = [0.1, 0.3, -0.2, 0.4];
-        for offset in offsets {
-            phase += filter.update(offset - phase, 0.05, 0.01);
+    fn code_loop_averages_and_says_how_well() {
+        // Without slip the phase is a mean: a phase known to 1, measured to 1, is known to 1/2.
+        let mut filter = CodeLoop::new(1.0);
+        let correction = filter.update(0.3, 1.0, 0.05, 1e-6);
+        assert_abs_diff_eq!(correction, 0.15, epsilon = 1e-9);
+        assert_abs_diff_eq!(filter.variance_chips2(), 0.5, epsilon = 1e-9);
+    }
+
+    #[test]
+    fn code_loop_follows_a_slip_without_error() {
+        let (mut filter, dt, slip) = (CodeLoop::new(1e-3), 0.01, 0.15);
+        let (mut error, mut largest) = (0.0, 0.0f64);
+        for _ in 0..20_000 {
+            error += (slip - filter.slip_hz()) * dt;
+            largest = largest.max(error);
+            error -= filter.update(error, 1e-3, 0.05, dt);
         }
-        // The running mean, and a quarter of the variance; the age begins at a picosecond.
-        assert_abs_diff_eq!(phase, 0.15, epsilon = 1e-9);
-        assert_abs_diff_eq!(filter.noise_per_s(), 0.25 / 0.01, epsilon = 1e-6);
+        // Noticed at half a deviation of the code error (0.03 chip), and then quickly followed.
+        assert!(largest < 0.08, "{largest} chips");
+        // 200 s are twenty time constants of the final bandwidth.
+        assert_abs_diff_eq!(error, 0.0, epsilon = 1e-6);
+    }
+
+    #[test]
+    fn the_floor_is_a_loop_of_the_bandwidth_asked_for() {
+        let (mut filter, dt, bandwidth) = (CodeLoop::new(1e-3), 0.01, 0.05);
         for _ in 0..100_000 {
-            filter.update(0.0, 0.05, 0.01);
+            filter.update(0.0, 1e-3, bandwidth, dt);
         }
-        // Twice the bandwidth, to first order in the gain of 0.002.
-        assert_abs_diff_eq!(filter.noise_per_s(), 0.1, epsilon = 2e-4);
+        // Noise of a loop: 2 * bandwidth * interval * variance; to first order in the gain.
+        let expected = 2.0 * bandwidth * dt * 1e-3;
+        assert_abs_diff_eq!(
+            filter.variance_chips2(),
+            expected,
+            epsilon = 0.02 * expected
+        );
     }
 }

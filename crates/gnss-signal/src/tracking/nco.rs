@@ -21,13 +21,17 @@ pub(super) struct Nco {
     pub(super) doppler_cycles: f64,
     /// Apparent Doppler, Hz.
     pub(super) doppler_hz: f64,
+    /// Code rate over the one that belongs to the Doppler, chips/s.
+    pub(super) code_slip_hz: f64,
 }
 
 impl Nco {
-    /// Code rate that belongs to the Doppler, chips/s.
+    /// Code rate, chips/s: that of the Doppler, and the slip.
     pub(super) fn code_rate_hz(&self) -> f64 {
         let spec = self.signal.spec();
-        spec.code_rate_hz * (1.0 + self.spectrum.sign() * self.doppler_hz / spec.carrier_hz)
+        let aided_hz =
+            spec.code_rate_hz * (1.0 + self.spectrum.sign() * self.doppler_hz / spec.carrier_hz);
+        aided_hz + self.code_slip_hz
     }
 
     /// Chips in a code period.
@@ -104,6 +108,7 @@ mod tests {
             carrier_phase_cycles: 0.25,
             doppler_cycles: 0.0,
             doppler_hz,
+            code_slip_hz: 0.0,
         }
     }
 

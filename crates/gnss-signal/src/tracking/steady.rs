@@ -19,6 +19,9 @@ const ACCELERATION_GAIN: f64 = 0.2;
 /// Ratio of signal to noise in one integration from which a fade is told from noise.
 const STRONG_SNR: f64 = 20.0;
 
+/// Deviation of the code phase when carrier lock is lost, chips.
+const UNLOCKED_SIGMA_CHIPS: f64 = 0.05;
+
 /// A signal tracked by its own loops.
 #[derive(Debug, Clone)]
 pub(super) struct Steady {
@@ -56,16 +59,20 @@ struct Fade {
 }
 
 impl Steady {
-    /// Tracking from `nco`, on a signal of `cn0_hz` whose code phase has been averaged for
-    /// `averaged_s`.
-    pub(super) fn new(nco: Nco, settings: TrackingSettings, cn0_hz: f64, averaged_s: f64) -> Self {
+    /// Tracking from `nco`, on a signal of `cn0_hz` whose code phase has that variance.
+    pub(super) fn new(
+        nco: Nco,
+        settings: TrackingSettings,
+        cn0_hz: f64,
+        code_variance_chips2: f64,
+    ) -> Self {
         let bit_periods = bit_periods(&nco);
         Self {
             nco,
             settings,
             bit_edge: nco.nearest_period().rem_euclid(bit_periods),
             carrier: CarrierLoop::new(settings.carrier_order, nco.doppler_hz),
-            code: CodeLoop::new(averaged_s),
+            code: CodeLoop::new(code_variance_chips2),
             detector: LockDetector::new(false),
             lock: Lock::Code,
             cn0_hz,
@@ -157,7 +164,7 @@ impl Steady {
             .update(prompt, strong_enough, interval_s, patience_s);
         self.slipped |= self.lock != Lock::Carrier;
         if before == Lock::Carrier && self.lock != Lock::Carrier {
-            self.code.widen(0.25 / self.settings.code_unlocked_hz);
+            self.code.widen(UNLOCKED_SIGMA_CHIPS * UNLOCKED_SIGMA_CHIPS);
         }
     }
 
@@ -178,7 +185,9 @@ impl Steady {
         self.nco.doppler_hz = self
             .carrier
             .update(phase_cycles, frequency_hz, carrier, interval_s);
-        let correction = self.code.update(code_chips, code_hz, interval_s);
+        let variance = self.code_error_variance_chips2();
+        let correction = self.code.update(code_chips, variance, code_hz, interval_s);
+        self.nco.code_slip_hz = self.code.slip_hz();
         self.nco.shift_code(correction);
     }
 
@@ -213,7 +222,7 @@ impl Steady {
             periods_into_bit: Some(
                 (at.code_period - self.bit_edge).rem_euclid(bit_periods(&at)) as u8,
             ),
-            code_variance_chips2: self.code_variance_chips2(),
+            code_variance_chips2: self.code.variance_chips2(),
             doppler_hz: sign * doppler_hz,
             doppler_variance_hz2,
             doppler_cycles: sign * at.doppler_cycles,
@@ -262,14 +271,11 @@ impl Steady {
         self.cn0_hz.max(lowest) * interval_s
     }
 
-    /// Variance of the code phase, chips^2: that of one early minus late (Kaplan2017, 8.95),
-    /// averaged by the loop.
-    fn code_variance_chips2(&self) -> f64 {
+    /// Variance of one code error (Kaplan2017, 8.95), chips^2.
+    fn code_error_variance_chips2(&self) -> f64 {
         let spacing = self.settings.spacing_chips;
         let snr = self.snr(self.interval_s());
-        let cn0_hz = snr / self.interval_s();
-        let squaring = 1.0 + 2.0 / ((2.0 - spacing) * snr);
-        self.code.noise_per_s() * spacing / (4.0 * cn0_hz) * squaring
+        spacing / (4.0 * snr) * (1.0 + 2.0 / ((2.0 - spacing) * snr))
     }
 }
 
