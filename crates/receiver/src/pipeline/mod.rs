@@ -6,12 +6,15 @@
 
 mod clock;
 mod discontinuity;
+mod fixes;
+mod follow;
 mod navigator;
 mod outcome;
 mod report;
 mod run;
 mod schedule;
 mod settings;
+mod sky;
 mod slot;
 mod spectrum;
 
