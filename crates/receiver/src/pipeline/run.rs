@@ -6,7 +6,7 @@ use gnss_nav::SatelliteId;
 use gnss_signal::tracking::{NoiseFloor, Spectrum, TrackingSettings};
 use gnss_signal::{CorrelatorBank, FrontEnd, Replica, SignalId, Taps};
 
-use super::discontinuity::{self};
+use super::discontinuity;
 use super::navigator::Navigator;
 use super::outcome::{Outcome, why_no_fix};
 use super::schedule::Schedule;
@@ -62,6 +62,7 @@ pub(super) enum Fixed {
     Before,
 }
 
+/// A run under way.
 pub(super) struct Run<'a, B> {
     pub(super) bank: B,
     pub(super) settings: &'a Settings,
