@@ -67,9 +67,25 @@ pub fn in_recording(input: &Input, error: SignalError) -> ReceiverError {
     }
 }
 
+/// Refuses less signal than a search needs.
+///
+/// # Errors
+/// [`ReceiverError::Content`] for less than a code period, of which a twentieth may be missing.
+pub fn enough(input: &Input, signal_s: f64) -> Result<(), ReceiverError> {
+    if signal_s <= 0.0 {
+        return Err(empty(input));
+    }
+    if signal_s < 0.95e-3 {
+        return Err(ReceiverError::Content {
+            path: input.to_string().into(),
+            what: "less than 1 ms of samples: expected a code period at least".to_owned(),
+        });
+    }
+    Ok(())
+}
+
 /// A recording without a single sample.
-#[must_use]
-pub fn empty(input: &Input) -> ReceiverError {
+fn empty(input: &Input) -> ReceiverError {
     ReceiverError::Content {
         path: input.to_string().into(),
         what: "empty: expected samples".to_owned(),
@@ -112,7 +128,7 @@ fn skipped(
 fn ends_before_start(recording: &Recording) -> ReceiverError {
     ReceiverError::Content {
         path: recording.input.to_string().into(),
-        what: format!("ends before --start {} s", recording.start_s),
+        what: format!("ends before --start {:?} s", recording.start_s),
     }
 }
 
@@ -151,7 +167,7 @@ mod tests {
             let recording = recording(path.to_owned(), SampleFormat::Ri8, start_s);
             open(&recording, true).err().unwrap().to_string()
         };
-        assert!(message(&path, 1.0).ends_with("a.bin: ends before --start 1 s"));
+        assert!(message(&path, 1.0).ends_with("a.bin: ends before --start 1.0 s"));
         std::fs::write(&path, []).unwrap();
         assert!(message(&path, 0.0).ends_with("a.bin: empty: expected samples"));
         assert!(message(&folder.path().join("b"), 0.0).contains("b: No such file"));

@@ -4,6 +4,7 @@ use super::discriminator::EarlyPromptLate;
 use super::epoch::ChannelEpoch;
 use super::nco::Nco;
 use super::pull_in::{PullInEstimate, Stretch};
+use super::sample_grid::code_error_correction_chips;
 use super::steady::Steady;
 use super::{Lock, NoiseFloor, TrackingSettings, cn0};
 use crate::{AcquisitionHit, FrontEnd, Replica, SignalId, TapOffsets, Taps};
@@ -62,6 +63,8 @@ struct PullIn {
     start: Nco,
     nco: Nco,
     stretch: Stretch,
+    /// Sum of what the sample grid did to the code errors of the stretch, chips.
+    grid_chips: f64,
 }
 
 /// Fewest periods of a stretch: two whole bits, whose code phases can be compared.
@@ -99,6 +102,7 @@ impl Channel {
                 start,
                 nco: start,
                 stretch: Stretch::default(),
+                grid_chips: 0.0,
             }),
         }
     }
@@ -181,11 +185,13 @@ impl Channel {
         match &mut self.stage {
             Stage::PullIn(p) => {
                 p.stretch.push(sums, variance);
+                p.grid_chips +=
+                    code_error_correction_chips(replica, p.nco.front_end.sample_rate_hz);
                 p.nco.advance_to(replica.end_tick);
                 self.look_at_stretch()
             }
             Stage::Steady(s) => {
-                let bit = s.update(&sums, variance, replica.end_tick);
+                let bit = s.update(&sums, variance, replica);
                 if s.lock() == Lock::Lost {
                     self.stage = Stage::Lost(s.nco.signal, s.nco.doppler_hz);
                 }
@@ -248,8 +254,11 @@ impl PullIn {
     }
 
     fn estimate(&self, settings: &TrackingSettings) -> Option<PullInEstimate> {
-        self.stretch
-            .estimate(self.period_s(), settings.spacing_chips)
+        let mut found = self
+            .stretch
+            .estimate(self.period_s(), settings.spacing_chips)?;
+        found.code_offset_chips += self.grid_chips / self.stretch.len() as f64;
+        Some(found)
     }
 
     /// The oscillators at the start, corrected by the estimate.
@@ -307,6 +316,7 @@ impl PullIn {
         self.start = nco;
         self.nco = nco;
         self.stretch = Stretch::default();
+        self.grid_chips = 0.0;
     }
 
     fn epoch(&self, tick: u64, settings: &TrackingSettings) -> Option<ChannelEpoch> {

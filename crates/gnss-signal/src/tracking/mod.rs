@@ -9,6 +9,7 @@ pub mod loop_filter;
 mod nco;
 mod noise;
 mod pull_in;
+mod sample_grid;
 mod settings;
 #[cfg(test)]
 mod simulated;

@@ -8,6 +8,7 @@ use super::epoch::{ChannelEpoch, Integration, PhaseLine, PreFilter};
 use super::lock::LockDetector;
 use super::loop_filter::{CarrierLoop, CodeLoop};
 use super::nco::Nco;
+use super::sample_grid::code_error_correction_chips;
 use super::{Lock, NavBit, TrackingSettings};
 use crate::Replica;
 
@@ -111,14 +112,15 @@ impl Steady {
         self.nco.replica(self.nco.tick_of_period(end), taps)
     }
 
-    /// Takes the sums of the replica that ends at `end_tick`.
+    /// Takes the sums of `replica`.
     pub(super) fn update(
         &mut self,
         taps: &EarlyPromptLate,
         noise_variance: f64,
-        end_tick: u64,
+        replica: &Replica,
     ) -> Option<NavBit> {
         let start = self.nco;
+        let end_tick = replica.end_tick;
         self.nco.advance_to(end_tick);
         let interval_s = (end_tick - start.tick) as f64 / start.front_end.sample_rate_hz;
         self.watch_power(taps.prompt, noise_variance, interval_s, start.tick);
@@ -128,7 +130,8 @@ impl Steady {
         let code_error = self
             .settings
             .code_discriminator
-            .error_chips(taps, self.settings.spacing_chips);
+            .error_chips(taps, self.settings.spacing_chips)
+            + code_error_correction_chips(replica, start.front_end.sample_rate_hz);
         self.pre_filter.push(Integration {
             middle_s: (start.tick + end_tick) as f64 / 2.0 / start.front_end.sample_rate_hz,
             phase_cycles: start.doppler_cycles + start.doppler_hz * interval_s / 2.0 + phase_error,

@@ -52,17 +52,9 @@ fn search(source: Source, config: &AcquireConfig) -> Result<Found, ReceiverError
         .with_search_threads(config.threads);
     let ticks_per_ms = bank.front_end().sample_rate_hz * 1e-3;
     let held = bank.advance_to((f64::from(wanted_ms) * ticks_per_ms).ceil() as u64)?;
-    if held == 0 {
-        return Err(samples::empty(&config.recording.input));
-    }
+    samples::enough(&config.recording.input, held as f64 / ticks_per_ms * 1e-3)?;
     // A last period that lacks a twentieth is taken for whole.
     let signal_ms = ((held as f64 / ticks_per_ms + 0.05) as u32).min(wanted_ms);
-    if signal_ms == 0 {
-        return Err(ReceiverError::Content {
-            path: config.recording.input.to_string().into(),
-            what: "less than 1 ms of samples: expected a code period at least".to_owned(),
-        });
-    }
     let (coherent_periods, noncoherent_sums) = plan(signal_ms);
     let signals = config.prns.iter().map(|prn| SignalId::gps_l1_ca(*prn));
     let report = bank.search(&SearchRequest {

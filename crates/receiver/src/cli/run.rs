@@ -43,9 +43,7 @@ pub(super) fn run(options: RunOptions, out: &mut dyn Write) -> Result<(), Receiv
         ReceiverError::Signal(error) => samples::in_recording(&config.recording.input, error),
         other => other,
     })?;
-    if outcome.signal_s <= 0.0 {
-        return Err(samples::empty(&config.recording.input));
-    }
+    samples::enough(&config.recording.input, outcome.signal_s)?;
     let cost = meter.cost(outcome.signal_s, outputs.channels_mean());
     let summary = outputs.finish(ending(&config, outcome, truth))?;
     if let Some(directory) = &config.out {

@@ -24,6 +24,14 @@ const BIT_SAFE_SIGMA_S: f64 = 2.5e-3;
 /// Bit boundaries of all satellites agree to this with a position good to 100 km, s.
 const BIT_AGREEMENT_S: f64 = 0.5e-3;
 
+/// Klobuchar's delay at night, 5 ns at the zenith (IS-GPS-200, 20.3.3.5.2.5).
+const NIGHT_IONOSPHERE: Klobuchar = Klobuchar {
+    alpha: [0.0; 4],
+    beta: [0.0; 4],
+};
+/// Deviation of the true delay from that, in its units: by day it is 2 to 10 times as much.
+const UNKNOWN_IONOSPHERE_FRACTION: f64 = 4.0;
+
 /// A channel with its epoch.
 pub(super) struct Tracked<'a> {
     pub(super) slot: &'a mut Slot,
@@ -148,12 +156,26 @@ impl Navigator {
     }
 
     /// Errors beyond tracking noise are those of real signals.
+    ///
+    /// Until the ionosphere's parameters are known its night-time delay stands in for it, with
+    /// room for the day's.
     fn model(&self) -> MeasurementModel {
+        let errors = ErrorModel::default();
+        let ionosphere_fraction = if self.ionosphere.is_some() {
+            errors.ionosphere_fraction
+        } else {
+            UNKNOWN_IONOSPHERE_FRACTION
+        };
         MeasurementModel {
-            ionosphere: self.ionosphere.filter(|_| self.use_ionosphere),
+            ionosphere: self
+                .use_ionosphere
+                .then(|| self.ionosphere.unwrap_or(NIGHT_IONOSPHERE)),
             troposphere: self.troposphere,
             elevation_mask_rad: self.mask_rad,
-            errors: ErrorModel::default(),
+            errors: ErrorModel {
+                ionosphere_fraction,
+                ..errors
+            },
         }
     }
 
