@@ -204,7 +204,7 @@ proptest! {
     }
 
     #[test]
-    fn arbitrary_bits_never_panic(
+    fn arbitrary_bits_yield_no_time_out_of_the_week_and_no_absurd_orbit(
         bits in prop::collection::vec((any::<f32>(), any::<u64>(), 0_u8..4), 0..500),
     ) {
         let mut decoder = decoder();
@@ -215,7 +215,14 @@ proptest! {
                 1 => code_period.wrapping_add(jump % 64 * 20),
                 _ => code_period.wrapping_add(20),
             };
-            let _ = decoder.push(NavBit { soft, code_period });
+            for event in decoder.push(NavBit { soft, code_period }) {
+                match event {
+                    // The time of week counts from 0 to the last second of a week.
+                    LnavEvent::Sync { tow_s, .. } => prop_assert!(tow_s < 604_800),
+                    LnavEvent::Ephemeris(found) => prop_assert!(quantise(&found).is_ok()),
+                    _ => {}
+                }
+            }
         }
     }
 
