@@ -10,8 +10,10 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) if cli::is_closed_output(&error) => ExitCode::SUCCESS,
         Err(error) => {
+            // One line, even where a file name or a value has more.
+            let line = error.to_string().replace(['\n', '\r'], " ");
             // Where standard error is closed too, the exit status has to say it all.
-            let _ = writeln!(io::stderr(), "receiver: {error}");
+            let _ = writeln!(io::stderr(), "receiver: {line}");
             ExitCode::from(2)
         }
     }

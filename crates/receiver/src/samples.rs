@@ -85,7 +85,8 @@ pub fn enough(input: &Input, signal_s: f64) -> Result<(), ReceiverError> {
 }
 
 /// A recording without a single sample.
-fn empty(input: &Input) -> ReceiverError {
+#[must_use]
+pub fn empty(input: &Input) -> ReceiverError {
     ReceiverError::Content {
         path: input.to_string().into(),
         what: "empty: expected samples".to_owned(),

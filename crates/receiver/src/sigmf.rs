@@ -92,8 +92,11 @@ pub fn read(recording: &Path) -> Result<Sidecar, ReceiverError> {
 /// # Errors
 /// What was found and what was expected.
 pub fn parse(text: &[u8]) -> Result<Sidecar, String> {
-    let metadata: Metadata =
-        serde_json::from_slice(text).map_err(|error| format!("no SigMF metadata: {error}"))?;
+    // An object first: a structure would be read from a list of its fields as well.
+    let metadata: Metadata = serde_json::from_slice(text)
+        .map(serde_json::Value::Object)
+        .and_then(serde_json::from_value)
+        .map_err(|error| format!("no SigMF metadata: {error}"))?;
     let global = metadata.global;
     let carrier_hz = metadata.captures.first().and_then(|c| c.frequency_hz);
     let from_carrier = carrier_hz.map(|hz| Signal::GpsL1Ca.spec().carrier_hz - hz);
@@ -145,6 +148,7 @@ mod tests {
         for text in [
             &b"{\"global\":"[..],
             b"",
+            b"[]",
             b"[1]",
             b"{\"global\":{\"core:sample_rate\":\"x\"}}",
         ] {
@@ -182,16 +186,48 @@ mod tests {
 
     proptest! {
         #[test]
-        fn arbitrary_bytes_never_panic(bytes in proptest::collection::vec(any::<u8>(), 0..200)) {
-            let _ = parse(&bytes);
+        fn arbitrary_bytes_are_one_line_of_error(
+            bytes in proptest::collection::vec(any::<u8>(), 0..200),
+        ) {
+            // Bytes that are metadata by chance say nothing of the recording.
+            match parse(&bytes) {
+                Ok(sidecar) => prop_assert_eq!(sidecar, Sidecar::default()),
+                Err(what) => prop_assert!(!what.contains('\n'), "{}", what),
+            }
         }
 
         #[test]
-        fn arbitrary_values_never_panic(rate in any::<f64>(), name in ".{0,12}") {
+        fn damaged_metadata_is_read_as_it_stands_or_refused(
+            at in 0_usize..80,
+            byte in any::<u8>(),
+            length in 0_usize..90,
+        ) {
+            let mut text = br#"{"global":{"core:datatype":"ci8","core:sample_rate":4000000}}"#.to_vec();
+            if let Some(place) = text.get_mut(at) {
+                *place = byte;
+            }
+            text.truncate(length);
+            match parse(&text) {
+                Ok(sidecar) => prop_assert!(sidecar.sample_rate_hz.is_none_or(f64::is_finite)),
+                Err(what) => prop_assert!(!what.contains('\n'), "{}", what),
+            }
+        }
+
+        #[test]
+        fn arbitrary_values_are_taken_over_or_refused(rate in any::<f64>(), name in ".{0,12}") {
             let text = serde_json::json!({
                 "global": {"core:sample_rate": rate, "core:datatype": name},
             });
-            let _ = parse(text.to_string().as_bytes());
+            match parse(text.to_string().as_bytes()) {
+                Ok(sidecar) => {
+                    prop_assert_eq!(sidecar.format, name.parse().ok());
+                    // JSON has no infinity: such a rate is written as absent.
+                    prop_assert_eq!(sidecar.sample_rate_hz, rate.is_finite().then_some(rate));
+                }
+                Err(what) => {
+                    prop_assert!(name.parse::<SampleFormat>().is_err() && !what.contains('\n'));
+                }
+            }
         }
     }
 }
