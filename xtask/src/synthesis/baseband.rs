@@ -35,8 +35,18 @@ impl Planes {
     }
 }
 
+/// What a sample holds of the code.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Sampling {
+    /// Its value at the instant.
+    Instant,
+    /// Its mean over the sample's interval, so that edges keep their place between samples.
+    Mean,
+}
+
 /// Adds one signal to blocks of samples, in order.
 pub(super) struct Modulator {
+    sampling: Sampling,
     code: &'static [i8; 1023],
     code_rate_hz: f64,
     periods_per_bit: u32,
@@ -49,9 +59,10 @@ pub(super) struct Modulator {
 }
 
 impl Modulator {
-    pub(super) fn new(source: SceneSignal, amplitude: f64) -> Self {
+    pub(super) fn new(source: SceneSignal, amplitude: f64, sampling: Sampling) -> Self {
         let spec = source.signal.spec();
         Self {
+            sampling,
             code: code_of(source.signal),
             code_rate_hz: spec.code_rate_hz,
             periods_per_bit: spec.code_periods_per_bit,
@@ -72,7 +83,12 @@ impl Modulator {
         planes: &mut Planes,
     ) -> Result<()> {
         let end_tick = tick + samples as i64;
-        let at = |tick: i64| self.path.arrival(tick as f64 / sample_rate_hz);
+        // The interval of a sample begins half a sample before it.
+        let begins = match self.sampling {
+            Sampling::Instant => 0.0,
+            Sampling::Mean => 0.5,
+        };
+        let at = |tick: i64| self.path.arrival((tick as f64 - begins) / sample_rate_hz);
         let start = match self.start {
             Some((held, arrival)) if held == tick => arrival,
             _ => at(tick)?,
@@ -89,11 +105,15 @@ impl Modulator {
             phase: (phase * FRACTION).round() as u64,
             step: (chips / samples as f64 * FRACTION).round() as u64,
         };
+        let step_cycles = (end.carrier_cycles - start.carrier_cycles) / samples as f64;
         let carrier = Rotation {
-            cycles: start.carrier_cycles,
-            step_cycles: (end.carrier_cycles - start.carrier_cycles) / samples as f64,
+            cycles: start.carrier_cycles + begins * step_cycles,
+            step_cycles,
         };
-        modulate(&self.table, code, carrier, planes);
+        match self.sampling {
+            Sampling::Instant => modulate(&self.table, code, carrier, planes, instant),
+            Sampling::Mean => modulate(&self.table, code, carrier, planes, mean),
+        }
         Ok(())
     }
 
@@ -151,12 +171,30 @@ struct Rotation {
     step_cycles: f64,
 }
 
+/// The chip at a phase.
+fn instant(table: &[f32; TABLE_CHIPS], code: CodePhase) -> f32 {
+    table[(code.phase >> FRACTION_BITS) as usize % TABLE_CHIPS]
+}
+
+/// The mean of the chips from a phase to the next (less than a chip on).
+fn mean(table: &[f32; TABLE_CHIPS], code: CodePhase) -> f32 {
+    let end = CodePhase {
+        phase: code.phase.wrapping_add(code.step),
+        ..code
+    };
+    let (first, last) = (instant(table, code), instant(table, end));
+    let into = end.phase & ((1 << FRACTION_BITS) - 1);
+    let share = (into as f32 / code.step as f32).min(1.0);
+    first + (last - first) * share
+}
+
 /// Adds table chips times carrier to every sample.
 fn modulate(
     table: &[f32; TABLE_CHIPS],
     mut code: CodePhase,
     carrier: Rotation,
     planes: &mut Planes,
+    chip_at: impl Fn(&[f32; TABLE_CHIPS], CodePhase) -> f32,
 ) {
     let lane = |k: usize| (TAU * carrier.step_cycles * k as f64).sin_cos();
     let lane_cos: [f32; LANES] = std::array::from_fn(|k| lane(k).1 as f32);
@@ -170,7 +208,7 @@ fn modulate(
     for (i, q) in i.iter_mut().zip(q) {
         let mut chips = [0.0; LANES];
         for chip in &mut chips {
-            *chip = table[(code.phase >> FRACTION_BITS) as usize % TABLE_CHIPS];
+            *chip = chip_at(table, code);
             code.phase = code.phase.wrapping_add(code.step);
         }
         let (c, s) = (cos as f32, sin as f32);
@@ -224,7 +262,7 @@ mod tests {
                 path: Box::new(path),
                 message: Message::Lnav(Box::new(encoder.clone())),
             };
-            let mut modulator = Modulator::new(source, 1.0);
+            let mut modulator = Modulator::new(source, 1.0, Sampling::Instant);
             let mut planes = Planes::default();
             let mut near_edges = 0;
             for block in 0..20_i64 {
@@ -262,7 +300,10 @@ mod tests {
                 path: Box::new(path),
                 message: Message::Unmodulated,
             };
-            let (mut modulator, mut planes) = (Modulator::new(source, 1.0), Planes::default());
+            let (mut modulator, mut planes) = (
+                Modulator::new(source, 1.0, Sampling::Instant),
+                Planes::default(),
+            );
             let (mut tick, mut all) = (-100, Vec::new());
             for &len in lengths {
                 planes.clear(len);

@@ -4,33 +4,36 @@ use std::f64::consts::{PI, TAU};
 
 use super::baseband::Planes;
 
-/// Taps on either side of the middle one; the transition is 3.3 / 65 of the sample rate wide.
-pub(super) const HALF_TAPS: usize = 32;
+/// Samples made for each sample delivered: a front end filters before it samples.
+pub(super) const OVERSAMPLING: usize = 4;
+/// Half the length of the filter, samples delivered; the transition is 3.3 / 65 of their rate wide.
+pub(super) const HALF_LENGTH: usize = 32;
+const HALF_TAPS: usize = HALF_LENGTH * OVERSAMPLING;
+const TAPS: usize = 2 * HALF_TAPS + 1;
 
-/// Samples filtered at a time.
-const TILE: usize = 256;
+/// Partial sums of a tap product.
+const LANES: usize = 16;
 
-/// A windowed-sinc low-pass (Hamming) with unit gain at zero frequency.
+/// A windowed-sinc low-pass (Hamming) with unit gain at zero frequency, before the sampler.
 #[derive(Debug, Clone)]
 pub(super) struct LowPass {
-    /// Middle tap first, then the symmetric ones outward.
-    taps: [f32; HALF_TAPS + 1],
+    taps: Box<[f32; TAPS]>,
     history: Planes,
 }
 
 impl LowPass {
-    /// Passes `bandwidth`, two-sided, as a fraction of the sample rate.
+    /// Passes `bandwidth`, two-sided, as a fraction of the rate delivered.
     pub(super) fn new(bandwidth: f64) -> Self {
-        let sinc = |k: usize| {
-            let x = PI * bandwidth * k as f64;
-            if k == 0 { 1.0 } else { x.sin() / x }
+        let tap = |k: usize| {
+            let from_middle = k as f64 - HALF_TAPS as f64;
+            let x = PI * bandwidth / OVERSAMPLING as f64 * from_middle;
+            let sinc = if x == 0.0 { 1.0 } else { x.sin() / x };
+            sinc * (0.54 + 0.46 * (PI * from_middle / (HALF_TAPS + 1) as f64).cos())
         };
-        let window = |k: usize| 0.54 + 0.46 * (PI * k as f64 / (HALF_TAPS + 1) as f64).cos();
-        let raw: [f64; HALF_TAPS + 1] = std::array::from_fn(|k| sinc(k) * window(k));
-        let gain = raw[0] + 2.0 * raw[1..].iter().sum::<f64>();
+        let gain: f64 = (0..TAPS).map(tap).sum();
         let zeros = vec![0.0; 2 * HALF_TAPS];
         Self {
-            taps: raw.map(|tap| (tap / gain) as f32),
+            taps: Box::new(std::array::from_fn(|k| (tap(k) / gain) as f32)),
             history: Planes {
                 i: zeros.clone(),
                 q: zeros,
@@ -38,13 +41,14 @@ impl LowPass {
         }
     }
 
-    /// Sum of the squared taps: what is left of the power of white noise.
+    /// What is left of the power of white noise that has a variance of 1 at the rate delivered.
     pub(super) fn noise_gain(&self) -> f64 {
-        let square = |tap: &f32| f64::from(*tap).powi(2);
-        square(&self.taps[0]) + 2.0 * self.taps[1..].iter().map(square).sum::<f64>()
+        let squares = self.taps.iter().map(|tap| f64::from(*tap).powi(2));
+        OVERSAMPLING as f64 * squares.sum::<f64>()
     }
 
-    /// Replaces the first `samples` of `planes` by filtered ones, [`HALF_TAPS`] samples older.
+    /// Replaces [`OVERSAMPLING`] times `samples` of `planes` by `samples` filtered ones,
+    /// [`HALF_LENGTH`] samples older.
     pub(super) fn filter(&mut self, samples: usize, planes: &mut Planes) {
         filter_plane(&self.taps, samples, &mut self.history.i, &mut planes.i);
         filter_plane(&self.taps, samples, &mut self.history.q, &mut planes.q);
@@ -52,35 +56,25 @@ impl LowPass {
 }
 
 /// One plane; `history` holds the last 2 [`HALF_TAPS`] inputs.
-fn filter_plane(
-    taps: &[f32; HALF_TAPS + 1],
-    samples: usize,
-    history: &mut Vec<f32>,
-    plane: &mut [f32],
-) {
-    history.extend_from_slice(&plane[..samples]);
-    let out = &mut plane[..samples];
-    let middle = &history[HALF_TAPS..];
-    // A tile stays in registers or the nearest cache while all taps pass over it.
-    for (at, out) in out
-        .chunks_mut(TILE)
-        .enumerate()
-        .map(|(n, tile)| (n * TILE, tile))
-    {
-        for (out, x) in out.iter_mut().zip(&middle[at..]) {
-            *out = taps[0] * x;
-        }
-        for (k, tap) in taps.iter().enumerate().skip(1) {
-            let (before, after) = (
-                &history[at + HALF_TAPS - k..],
-                &history[at + HALF_TAPS + k..],
-            );
-            for ((out, a), b) in out.iter_mut().zip(before).zip(after) {
-                *out += tap * (a + b);
-            }
+fn filter_plane(taps: &[f32; TAPS], samples: usize, history: &mut Vec<f32>, plane: &mut [f32]) {
+    let made = samples * OVERSAMPLING;
+    history.extend_from_slice(&plane[..made]);
+    for (n, out) in plane[..samples].iter_mut().enumerate() {
+        *out = product(taps, &history[n * OVERSAMPLING..n * OVERSAMPLING + TAPS]);
+    }
+    history.drain(..made);
+}
+
+/// Sum of the products, in [`LANES`] partial sums that a processor makes at once.
+fn product(taps: &[f32; TAPS], inputs: &[f32]) -> f32 {
+    let mut sums = [0.0; LANES];
+    let (taps, inputs) = (taps.chunks(LANES), inputs.chunks(LANES));
+    for (taps, inputs) in taps.zip(inputs) {
+        for ((sum, tap), input) in sums.iter_mut().zip(taps).zip(inputs) {
+            *sum += tap * input;
         }
     }
-    history.drain(..samples);
+    sums.iter().sum()
 }
 
 /// Turns baseband samples to the intermediate frequency.
@@ -105,16 +99,18 @@ pub(super) fn shift(frequency: f64, first_tick: i64, samples: usize, planes: &mu
 mod tests {
     use super::*;
 
+    /// Gain at a frequency in units of the rate delivered.
     fn response(filter: &LowPass, frequency: f64) -> f64 {
-        let pair = |k: usize| 2.0 * (TAU * frequency * k as f64).cos();
-        let taps = filter.taps.iter().enumerate().skip(1);
-        f64::from(filter.taps[0]) + taps.map(|(k, t)| f64::from(*t) * pair(k)).sum::<f64>()
+        let from_middle = |k: usize| (k as f64 - HALF_TAPS as f64) / OVERSAMPLING as f64;
+        let taps = filter.taps.iter().enumerate();
+        taps.map(|(k, t)| f64::from(*t) * (TAU * frequency * from_middle(k)).cos())
+            .sum()
     }
 
     #[test]
     fn passes_its_band_and_stops_the_rest() {
         let filter = LowPass::new(0.8);
-        for k in 0..=50 {
+        for k in 0..=200 {
             let frequency = f64::from(k) / 100.0;
             let gain = response(&filter, frequency);
             // Half the transition is 0.026; Hamming ripples by 0.2 % and stops 53 dB.
@@ -129,22 +125,25 @@ mod tests {
 
     #[test]
     fn delays_by_half_its_length_over_blocks_of_any_size() {
-        let wave = |n: i64| (0.3 * n as f64).cos() as f32;
+        // Cosine of the time in samples delivered.
+        let wave = |made: i64| (0.3 * made as f64 / OVERSAMPLING as f64).cos() as f32;
         let mut filter = LowPass::new(0.5);
         let (mut next, mut out) = (0, Vec::new());
         for samples in [10, 1, 300, 64, 65] {
-            let plane: Vec<f32> = (next..next + samples).map(wave).collect();
+            let made = samples * OVERSAMPLING as i64;
+            let plane: Vec<f32> = (next..next + made).map(wave).collect();
             let mut planes = Planes {
                 i: plane.clone(),
                 q: plane,
             };
             filter.filter(samples as usize, &mut planes);
-            out.extend(planes.i);
-            next += samples;
+            out.extend_from_slice(&planes.i[..samples as usize]);
+            next += made;
         }
-        for (n, value) in out.iter().enumerate().skip(2 * HALF_TAPS) {
+        for (n, value) in out.iter().enumerate().skip(2 * HALF_LENGTH) {
             // Ripple of the pass band.
-            assert!((value - wave(n as i64 - HALF_TAPS as i64)).abs() < 0.005);
+            let expected = wave((n as i64 - HALF_LENGTH as i64) * OVERSAMPLING as i64);
+            assert!((value - expected).abs() < 0.005);
         }
     }
 

@@ -8,8 +8,8 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use super::baseband::{LONGEST_BLOCK_S, Modulator, Planes};
-use super::filter::{HALF_TAPS, LowPass, shift};
+use super::baseband::{LONGEST_BLOCK_S, Modulator, Planes, Sampling};
+use super::filter::{HALF_LENGTH, LowPass, OVERSAMPLING, shift};
 use super::quantise::Quantiser;
 use super::scene::Scene;
 
@@ -45,12 +45,16 @@ impl Synthesiser {
             .iter()
             .map(|s| scene.amplitude(s.cn0_dbhz))
             .collect();
+        let sampling = match filter {
+            Some(_) => Sampling::Mean,
+            None => Sampling::Instant,
+        };
         let noise_power = filter.as_ref().map_or(1.0, LowPass::noise_gain);
         let signal_power: f64 = amplitudes.iter().map(|a| a * a / 2.0).sum();
         let rms = (noise_power + signal_power).sqrt();
         // The filter looks half its length ahead and back.
         let reach = if filter.is_some() {
-            HALF_TAPS as i64
+            HALF_LENGTH as i64
         } else {
             0
         };
@@ -70,7 +74,7 @@ impl Synthesiser {
                 .signals
                 .into_iter()
                 .zip(amplitudes)
-                .map(|(signal, amplitude)| Modulator::new(signal, amplitude))
+                .map(|(signal, amplitude)| Modulator::new(signal, amplitude, sampling))
                 .collect(),
         })
     }
@@ -89,19 +93,26 @@ impl Synthesiser {
 
     /// Signals, noise and filter over the next `samples` ticks.
     fn make(&mut self, samples: usize) -> Result<()> {
-        let rate_hz = self.description.sample_rate_hz;
-        self.planes.clear(samples);
+        let over = match self.filter {
+            Some(_) => OVERSAMPLING,
+            None => 1,
+        };
+        let rate_hz = self.description.sample_rate_hz * over as f64;
+        let (tick, made) = (self.made * over as i64, samples * over);
+        self.planes.clear(made);
         for modulator in &mut self.modulators {
-            modulator.add(self.made, samples, rate_hz, &mut self.planes)?;
+            modulator.add(tick, made, rate_hz, &mut self.planes)?;
         }
-        let (i, q) = (&mut self.planes.i[..samples], &mut self.planes.q[..samples]);
+        // The density of the noise is that of a deviation of 1 at the sample rate.
+        let deviation = (over as f32).sqrt();
+        let (i, q) = (&mut self.planes.i[..made], &mut self.planes.q[..made]);
         for (i, q) in i.iter_mut().zip(q) {
             let (a, b): (f32, f32) = (
                 StandardNormal.sample(&mut self.noise),
                 StandardNormal.sample(&mut self.noise),
             );
-            *i += a;
-            *q += b;
+            *i += deviation * a;
+            *q += deviation * b;
         }
         if let Some(filter) = &mut self.filter {
             filter.filter(samples, &mut self.planes);

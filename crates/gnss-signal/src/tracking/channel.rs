@@ -51,7 +51,7 @@ pub struct Channel {
 
 #[derive(Debug, Clone)]
 enum Stage {
-    PullIn(PullIn),
+    PullIn(Box<PullIn>),
     Steady(Box<Steady>),
     /// With the last Doppler, Hz.
     Lost(SignalId, f64),
@@ -98,12 +98,12 @@ impl Channel {
         start.doppler_cycles = 0.0;
         Self {
             settings,
-            stage: Stage::PullIn(PullIn {
+            stage: Stage::PullIn(Box::new(PullIn {
                 start,
                 nco: start,
                 stretch: Stretch::default(),
                 grid_chips: 0.0,
-            }),
+            })),
         }
     }
 

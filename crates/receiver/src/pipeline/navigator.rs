@@ -32,6 +32,9 @@ const NIGHT_IONOSPHERE: Klobuchar = Klobuchar {
 /// Deviation of the true delay from that, in its units: by day it is 2 to 10 times as much.
 const UNKNOWN_IONOSPHERE_FRACTION: f64 = 4.0;
 
+/// Satellites this far below the horizon are not looked for, rad (10 degrees).
+const HORIZON_MARGIN_RAD: f64 = 0.175;
+
 /// A channel with its epoch.
 pub(super) struct Tracked<'a> {
     pub(super) slot: &'a mut Slot,
@@ -133,12 +136,11 @@ impl Navigator {
         }
     }
 
-    /// Whether `satellite` is known to be below the horizon.
+    /// Whether `satellite` is known, from a fix and not from aiding alone, to be below the horizon.
     pub(super) fn is_below_horizon(&self, satellite: SatelliteId, tick: u64) -> bool {
-        self.expected(satellite, tick).is_some_and(|e| {
-            let margin = 10f64.to_radians();
-            e.look.elevation_rad < -margin
-        })
+        let solved = self.place.is_some_and(|p| p.solved);
+        let expected = self.expected(satellite, tick).filter(|_| solved);
+        expected.is_some_and(|e| e.look.elevation_rad < -HORIZON_MARGIN_RAD)
     }
 
     /// What is expected of a satellite, where time, place and ephemeris are known.
