@@ -16,22 +16,44 @@ const LARGEST_DENOMINATOR: u32 = 4;
 /// Turns of the sample grid against the chips in an interval from which edges average out.
 const AVERAGED_TURNS: f64 = 4.0;
 
+/// Code phases over which a replica is shifted in turn, in parts of a sample.
+const SHIFTS: u32 = 16;
+
+/// Chips by which to shift the replica of the `turn`-th integration.
+///
+/// The correction is exact only where the discriminator answers with its full slope, and a
+/// band-limited peak answers with less. Shifted over a whole sample in turn, the steps average out
+/// whatever the slope. Zero where the edges average out by themselves.
+pub(super) fn shift_chips(turn: u32, replica: &Replica, sample_rate_hz: f64) -> f64 {
+    if !stands_still(replica, sample_rate_hz) {
+        return 0.0;
+    }
+    // Neighbouring turns lie far apart (7 and 16 have no common divisor).
+    let part = (f64::from(7 * (turn % SHIFTS) % SHIFTS) + 0.5) / f64::from(SHIFTS) - 0.5;
+    part * replica.code_rate_hz / sample_rate_hz
+}
+
+/// Whether all chip edges of an interval lie at nearly the same part of a sample.
+fn stands_still(replica: &Replica, sample_rate_hz: f64) -> bool {
+    let samples_per_chip = sample_rate_hz / replica.code_rate_hz;
+    let chips = (replica.end_tick - replica.start_tick) as f64 / samples_per_chip;
+    (1..=LARGEST_DENOMINATOR).any(|q| {
+        let advance = f64::from(q) * samples_per_chip;
+        (advance - advance.round()).abs() * chips / f64::from(q) < AVERAGED_TURNS
+    })
+}
+
 /// Chips to add to the code error that early and late taps of `replica` give.
 ///
 /// Zero where the edges average out by themselves. Exact for a signal band-limited to half the
 /// sample rate.
 pub(super) fn code_error_correction_chips(replica: &Replica, sample_rate_hz: f64) -> f64 {
     let samples_per_chip = sample_rate_hz / replica.code_rate_hz;
-    let samples = (replica.end_tick - replica.start_tick) as f64;
-    let chips = samples / samples_per_chip;
-    let stands_still = (1..=LARGEST_DENOMINATOR).any(|q| {
-        let advance = f64::from(q) * samples_per_chip;
-        (advance - advance.round()).abs() * chips / f64::from(q) < AVERAGED_TURNS
-    });
+    let chips = (replica.end_tick - replica.start_tick) as f64 / samples_per_chip;
     let [early, _, late, ..] = *replica.tap_offsets.as_slice() else {
         return 0.0;
     };
-    if !stands_still {
+    if !stands_still(replica, sample_rate_hz) {
         return 0.0;
     }
     let lag =
@@ -80,6 +102,19 @@ mod tests {
             // Rounding of positions up to 40 000 samples.
             assert_abs_diff_eq!(correction, acts_as - phase, epsilon = 1e-9);
         }
+    }
+
+    #[test]
+    fn the_shifts_cover_a_sample_evenly() {
+        let mut shifts: Vec<f64> = (0..16)
+            .map(|turn| shift_chips(turn, &replica(0.0), 4.092e6))
+            .collect();
+        shifts.sort_by(f64::total_cmp);
+        for (k, shift) in shifts.iter().enumerate() {
+            // A quarter chip in sixteen steps about zero; rounding only.
+            assert_abs_diff_eq!(*shift, (k as f64 - 7.5) / 64.0, epsilon = 1e-12);
+        }
+        assert_eq!(shift_chips(3, &replica(0.0), 4.0e6), 0.0);
     }
 
     #[test]
