@@ -13,7 +13,11 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use crate::constellation;
-use crate::synthesis::{Message, Scene, SceneSignal, SignalPath, Synthesiser, UniformPath};
+use crate::scenario::antenna::{Gain, Reception, Scene};
+use crate::scenario::emitter::PlainEmitter;
+use crate::scenario::if_signal::Synthesiser;
+use crate::scenario::message::Message;
+use crate::scenario::path::{SignalPath, UniformPath};
 
 /// Rates compared, Hz: 4 and 16 samples a chip exactly, beside rates next to them.
 pub const RATES_HZ: [f64; 4] = [4.0e6, 4.092e6, 16.368e6, 16.369e6];
@@ -125,21 +129,24 @@ fn scene(experiment: &Experiment, case: Case, path: UniformPath, seed: u64) -> R
     let ephemerides = constellation::nominal(path.code_time)?;
     let own = ephemerides.iter().find(|e| e.satellite.prn == PRN);
     let encoder = LnavEncoder::new(own.context("no such satellite")?)?;
+    let message = Message::Lnav(Box::new(encoder));
+    let signal = SignalId::gps_l1_ca(PRN)?;
+    let emitter = PlainEmitter::new(signal, experiment.cn0_dbhz, Box::new(path), message);
     Ok(Scene {
-        samples: SampleDescription {
-            format: SampleFormat::Ci8,
-            sample_rate_hz: case.sample_rate_hz,
-            intermediate_frequency_hz: 0.0,
-            swap_iq: false,
+        reception: Reception {
+            samples: SampleDescription {
+                format: SampleFormat::Ci8,
+                sample_rate_hz: case.sample_rate_hz,
+                intermediate_frequency_hz: 0.0,
+                swap_iq: false,
+            },
+            bandwidth_hz: case.bandwidth.map(|b| b * case.sample_rate_hz),
+            gain: Gain::Fixed,
         },
         duration_s: experiment.settle_s + experiment.judged_s,
-        signals: vec![SceneSignal {
-            signal: SignalId::gps_l1_ca(PRN)?,
-            cn0_dbhz: experiment.cn0_dbhz,
-            path: Box::new(path),
-            message: Message::Lnav(Box::new(encoder)),
-        }],
-        bandwidth: case.bandwidth,
+        emitters: vec![Box::new(emitter)],
+        interference: vec![],
+        gaps: vec![],
         seed,
     })
 }

@@ -16,9 +16,11 @@ use receiver::pipeline::{Aiding, Settings, run};
 use receiver::record::{Acquired, EventKind, PvtRecord, Record};
 
 use crate::constellation;
-use crate::synthesis::{
-    Atmosphere, Message, OrbitPath, ReceiverMotion, Scene, SceneSignal, Synthesiser,
-};
+use crate::scenario::antenna::{Emitter, Gain, Reception, Scene};
+use crate::scenario::emitter::PlainEmitter;
+use crate::scenario::if_signal::Synthesiser;
+use crate::scenario::message::Message;
+use crate::scenario::path::{Atmosphere, OrbitPath, ReceiverMotion};
 
 /// Signal made, s.
 const DURATION_S: f64 = 0.5;
@@ -137,33 +139,37 @@ fn scene(
     truth: &ReceiverMotion,
     seed: u64,
 ) -> Result<Scene> {
-    let signals = sent.iter().map(|&(satellite, _, cn0_dbhz)| {
+    let emitters = sent.iter().map(|&(satellite, _, cn0_dbhz)| {
         let own = ephemerides.iter().find(|e| e.satellite == satellite);
         let ephemeris = *own.context("a satellite without an orbit")?;
-        Ok(SceneSignal {
-            signal: SignalId::gps_l1_ca(satellite.prn)?,
-            cn0_dbhz,
-            path: Box::new(OrbitPath {
-                ephemeris,
-                receiver: *truth,
-                atmosphere: Atmosphere {
-                    ionosphere: Some(IONOSPHERE),
-                    troposphere: true,
-                },
-            }),
-            message: Message::Lnav(Box::new(LnavEncoder::new(&ephemeris)?)),
-        })
+        let path = OrbitPath {
+            ephemeris,
+            receiver: *truth,
+            atmosphere: Atmosphere {
+                ionosphere: Some(IONOSPHERE),
+                troposphere: true,
+            },
+        };
+        let signal = SignalId::gps_l1_ca(satellite.prn)?;
+        let message = Message::Lnav(Box::new(LnavEncoder::new(&ephemeris)?));
+        let emitter = PlainEmitter::new(signal, cn0_dbhz, Box::new(path), message);
+        Ok(Box::new(emitter) as Box<dyn Emitter>)
     });
     Ok(Scene {
-        samples: SampleDescription {
-            format: SampleFormat::Ci8,
-            sample_rate_hz: SAMPLE_RATE_HZ,
-            intermediate_frequency_hz: 0.0,
-            swap_iq: false,
+        reception: Reception {
+            samples: SampleDescription {
+                format: SampleFormat::Ci8,
+                sample_rate_hz: SAMPLE_RATE_HZ,
+                intermediate_frequency_hz: 0.0,
+                swap_iq: false,
+            },
+            bandwidth_hz: Some(BANDWIDTH * SAMPLE_RATE_HZ),
+            gain: Gain::Fixed,
         },
         duration_s: DURATION_S,
-        signals: signals.collect::<Result<_>>()?,
-        bandwidth: Some(BANDWIDTH),
+        emitters: emitters.collect::<Result<_>>()?,
+        interference: vec![],
+        gaps: vec![],
         seed,
     })
 }

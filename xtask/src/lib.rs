@@ -4,5 +4,5 @@ pub mod ci;
 pub mod code_noise;
 pub mod constellation;
 pub mod demo;
-pub mod synthesis;
+pub mod scenario;
 pub mod tidy;

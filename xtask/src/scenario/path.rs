@@ -7,18 +7,10 @@ use gnss_nav::prediction::{ReceiverState, predict};
 use gnss_nav::{Ephemeris, Geodetic, GpsTime};
 use nalgebra::Vector3;
 
-/// What arrives of a satellite at one instant.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Arrival {
-    /// Reading of the satellite's clock in the code and data that arrive.
-    pub code_time: GpsTime,
-    /// Phase of the carrier against an oscillator of exactly the carrier frequency by the
-    /// receiver's clock, cycles; grows with positive Doppler.
-    pub carrier_cycles: f64,
-}
+use super::antenna::Arrival;
 
 /// Where a signal's code and carrier stand when they arrive.
-pub trait SignalPath {
+pub trait SignalPath: Send {
     /// What arrives when the receiver's clock has run for `elapsed_s` since the first sample
     /// (below zero: before it).
     ///

@@ -4,11 +4,9 @@ use std::f64::consts::TAU;
 
 use anyhow::{Result, ensure};
 use gnss_nav::GpsTime;
-use gnss_signal::{SignalId, ranging_code};
+use gnss_signal::ranging_code;
 
-use super::message::BitStream;
-use super::path::{Arrival, SignalPath};
-use super::scene::SceneSignal;
+use crate::scenario::antenna::{Emitter, Ray};
 
 /// Samples whose carrier is turned together.
 pub(super) const LANES: usize = 16;
@@ -44,32 +42,32 @@ pub(super) enum Sampling {
     Mean,
 }
 
-/// Adds one signal to blocks of samples, in order.
+/// Adds one transmitter's rays to blocks of samples.
 pub(super) struct Modulator {
     sampling: Sampling,
     code: &'static [i8; 1023],
     code_rate_hz: f64,
     periods_per_bit: u32,
-    path: Box<dyn SignalPath>,
-    bits: BitStream,
-    amplitude: f32,
-    /// Where the next block begins.
-    start: Option<(i64, Arrival)>,
+    emitter: Box<dyn Emitter>,
+    /// Amplitude of a component over the square root of C/N0 in Hz.
+    scale: f64,
+    begin: Vec<Ray>,
+    end: Vec<Ray>,
     table: Box<[f32; TABLE_CHIPS]>,
 }
 
 impl Modulator {
-    pub(super) fn new(source: SceneSignal, amplitude: f64, sampling: Sampling) -> Self {
-        let spec = source.signal.spec();
+    pub(super) fn new(emitter: Box<dyn Emitter>, scale: f64, sampling: Sampling) -> Self {
+        let spec = emitter.signal().spec();
         Self {
             sampling,
-            code: code_of(source.signal),
+            code: ranging_code(emitter.signal()),
             code_rate_hz: spec.code_rate_hz,
             periods_per_bit: spec.code_periods_per_bit,
-            path: source.path,
-            bits: BitStream::new(source.message),
-            amplitude: amplitude as f32,
-            start: None,
+            emitter,
+            scale,
+            begin: Vec::new(),
+            end: Vec::new(),
             table: Box::new([0.0; TABLE_CHIPS]),
         }
     }
@@ -82,44 +80,48 @@ impl Modulator {
         sample_rate_hz: f64,
         planes: &mut Planes,
     ) -> Result<()> {
-        let end_tick = tick + samples as i64;
         // The interval of a sample begins half a sample before it.
         let begins = match self.sampling {
             Sampling::Instant => 0.0,
             Sampling::Mean => 0.5,
         };
-        let at = |tick: i64| self.path.arrival((tick as f64 - begins) / sample_rate_hz);
-        let start = match self.start {
-            Some((held, arrival)) if held == tick => arrival,
-            _ => at(tick)?,
-        };
-        let end = at(end_tick)?;
-        self.start = Some((end_tick, end));
-        let chips = (end.code_time - start.code_time) * self.code_rate_hz;
-        ensure!(
-            chips > 0.0 && chips < (TABLE_CHIPS / 2 + 32) as f64,
-            "the code advances by {chips} chips over {samples} samples"
-        );
-        let phase = self.fill_table(start.code_time, chips)?;
-        let code = CodePhase {
-            phase: (phase * FRACTION).round() as u64,
-            step: (chips / samples as f64 * FRACTION).round() as u64,
-        };
-        let step_cycles = (end.carrier_cycles - start.carrier_cycles) / samples as f64;
-        let carrier = Rotation {
-            cycles: start.carrier_cycles + begins * step_cycles,
-            step_cycles,
-        };
-        match self.sampling {
-            Sampling::Instant => modulate(&self.table, code, carrier, planes, instant),
-            Sampling::Mean => modulate(&self.table, code, carrier, planes, mean),
+        let at_s = |tick: i64| (tick as f64 - begins) / sample_rate_hz;
+        let (begin_s, end_s) = (at_s(tick), at_s(tick + samples as i64));
+        let within_s = 0.5 * (begin_s + end_s);
+        self.begin.clear();
+        self.end.clear();
+        self.emitter.rays(begin_s, within_s, &mut self.begin)?;
+        self.emitter.rays(end_s, within_s, &mut self.end)?;
+        for ray in 0..self.begin.len().min(self.end.len()) {
+            let (start, end) = (self.begin[ray], self.end[ray]);
+            let chips = (end.arrival.code_time - start.arrival.code_time) * self.code_rate_hz;
+            ensure!(
+                chips > 0.0 && chips < (TABLE_CHIPS / 2 + 32) as f64,
+                "the code advances by {chips} chips over {samples} samples"
+            );
+            let amplitude = (self.scale * start.amplitude) as f32;
+            let phase = self.fill_table(start.arrival.code_time, chips, amplitude)?;
+            let code = CodePhase {
+                phase: (phase * FRACTION).round() as u64,
+                step: (chips / samples as f64 * FRACTION).round() as u64,
+            };
+            let first_cycles = start.arrival.carrier_cycles;
+            let step_cycles = (end.arrival.carrier_cycles - first_cycles) / samples as f64;
+            let carrier = Rotation {
+                cycles: first_cycles + begins * step_cycles,
+                step_cycles,
+            };
+            match self.sampling {
+                Sampling::Instant => modulate(&self.table, code, carrier, planes, instant),
+                Sampling::Mean => modulate(&self.table, code, carrier, planes, mean),
+            }
         }
         Ok(())
     }
 
     /// Puts the chips from `time` on, with their bits and amplitude, into the table; returns the
     /// phase inside the first of them.
-    fn fill_table(&mut self, time: GpsTime, chips: f64) -> Result<f64> {
+    fn fill_table(&mut self, time: GpsTime, chips: f64, amplitude: f32) -> Result<f64> {
         let since_second = time.fraction_s() * self.code_rate_hz;
         let first = since_second.floor();
         let mut second = GpsTime::from_parts(time.week(), time.second().into(), 0.0);
@@ -132,10 +134,10 @@ impl Modulator {
         while filled < wanted {
             let (period, chip) = (at / length, at % length);
             let sign = self
-                .bits
-                .sign(second, period / self.periods_per_bit as usize)?;
+                .emitter
+                .bit_sign(second, period / self.periods_per_bit as usize)?;
             let run = (length - chip).min(wanted - filled);
-            let level = sign * self.amplitude;
+            let level = sign * amplitude;
             let to = &mut self.table[filled..filled + run];
             for (out, code) in to.iter_mut().zip(&self.code[chip..chip + run]) {
                 *out = level * f32::from(*code);
@@ -152,10 +154,6 @@ impl Modulator {
 }
 
 const FRACTION: f64 = (1_u64 << FRACTION_BITS) as f64;
-
-fn code_of(signal: SignalId) -> &'static [i8; 1023] {
-    ranging_code(signal)
-}
 
 /// Code phase and rate, chips in fixed point.
 #[derive(Debug, Clone, Copy)]
@@ -228,9 +226,13 @@ mod tests {
     use gnss_nav::constants::L1_HZ;
     use gnss_nav::lnav::LnavEncoder;
 
+    use gnss_signal::SignalId;
+
     use super::*;
     use crate::constellation::nominal;
-    use crate::synthesis::{Message, UniformPath};
+    use crate::scenario::emitter::PlainEmitter;
+    use crate::scenario::message::Message;
+    use crate::scenario::path::{SignalPath, UniformPath};
 
     /// Code, bit and carrier in `f64` at one sample, straight from the definition.
     fn ideal(path: &UniformPath, encoder: &LnavEncoder, elapsed_s: f64) -> (f64, f64, f64) {
@@ -256,12 +258,10 @@ mod tests {
                 code_time,
                 doppler_hz,
             };
-            let source = SceneSignal {
-                signal: SignalId::gps_l1_ca(3).unwrap(),
-                cn0_dbhz: 45.0,
-                path: Box::new(path),
-                message: Message::Lnav(Box::new(encoder.clone())),
-            };
+            let message = Message::Lnav(Box::new(encoder.clone()));
+            let signal = SignalId::gps_l1_ca(3).unwrap();
+            // 0 dB-Hz: an amplitude of 1.
+            let source = Box::new(PlainEmitter::new(signal, 0.0, Box::new(path), message));
             let mut modulator = Modulator::new(source, 1.0, Sampling::Instant);
             let mut planes = Planes::default();
             let mut near_edges = 0;
@@ -294,12 +294,9 @@ mod tests {
             doppler_hz: L1_HZ * 1e-6,
         };
         let samples_in = |lengths: &[usize]| {
-            let source = SceneSignal {
-                signal: SignalId::gps_l1_ca(8).unwrap(),
-                cn0_dbhz: 45.0,
-                path: Box::new(path),
-                message: Message::Unmodulated,
-            };
+            let signal = SignalId::gps_l1_ca(8).unwrap();
+            let message = Message::Unmodulated;
+            let source = Box::new(PlainEmitter::new(signal, 0.0, Box::new(path), message));
             let (mut modulator, mut planes) = (
                 Modulator::new(source, 1.0, Sampling::Instant),
                 Planes::default(),

@@ -15,13 +15,15 @@ pub enum Message {
 
 /// Bits of a message in time, with the present subframe at hand.
 #[derive(Debug, Clone)]
-pub(super) struct BitStream {
+pub struct BitStream {
     message: Message,
     present: Option<(i32, u32, [bool; SUBFRAME_BITS])>,
 }
 
 impl BitStream {
-    pub(super) const fn new(message: Message) -> Self {
+    /// The bits of `message`.
+    #[must_use]
+    pub const fn new(message: Message) -> Self {
         Self {
             message,
             present: None,
@@ -29,7 +31,10 @@ impl BitStream {
     }
 
     /// Sign of bit `index` (0 to 49) of the second that begins at `second`: a one is negative.
-    pub(super) fn sign(&mut self, second: GpsTime, index: usize) -> Result<f32> {
+    ///
+    /// # Errors
+    /// Where the message cannot be encoded.
+    pub fn sign(&mut self, second: GpsTime, index: usize) -> Result<f32> {
         let Message::Lnav(encoder) = &self.message else {
             return Ok(1.0);
         };

@@ -11,7 +11,7 @@ use rand_distr::{Distribution, StandardNormal};
 use super::baseband::{LONGEST_BLOCK_S, Modulator, Planes, Sampling};
 use super::filter::{HALF_LENGTH, LowPass, OVERSAMPLING, shift};
 use super::quantise::Quantiser;
-use super::scene::Scene;
+use crate::scenario::antenna::{Ray, Scene};
 
 /// Makes the samples of a [`Scene`], a block of at most 2 ms at a time.
 ///
@@ -39,18 +39,24 @@ impl Synthesiser {
     /// Where a value of the scene is impossible.
     pub fn new(scene: Scene) -> Result<Self> {
         scene.check()?;
-        let filter = scene.bandwidth.map(LowPass::new);
-        let amplitudes: Vec<f64> = scene
-            .signals
-            .iter()
-            .map(|s| scene.amplitude(s.cn0_dbhz))
-            .collect();
+        let samples = scene.reception.samples;
+        let length_ticks = scene.length_ticks() as i64;
+        let bandwidth = scene.reception.bandwidth_hz;
+        let filter = bandwidth.map(|b| LowPass::new(b / samples.sample_rate_hz));
+        let scale = amplitude_scale(&samples);
         let sampling = match filter {
             Some(_) => Sampling::Mean,
             None => Sampling::Instant,
         };
         let noise_power = filter.as_ref().map_or(1.0, LowPass::noise_gain);
-        let signal_power: f64 = amplitudes.iter().map(|a| a * a / 2.0).sum();
+        let mut emitters = scene.emitters;
+        let mut signal_power = 0.0;
+        for emitter in &mut emitters {
+            let mut rays = Vec::new();
+            emitter.rays(0.0, 0.0, &mut rays)?;
+            let square = |ray: &Ray| (ray.amplitude * scale).powi(2) / 2.0;
+            signal_power += rays.iter().map(square).sum::<f64>();
+        }
         let rms = (noise_power + signal_power).sqrt();
         // The filter looks half its length ahead and back.
         let reach = if filter.is_some() {
@@ -59,22 +65,20 @@ impl Synthesiser {
             0
         };
         Ok(Self {
-            description: scene.samples,
-            length_ticks: scene.length_ticks(),
-            block_ticks: (LONGEST_BLOCK_S * scene.samples.sample_rate_hz) as i64,
+            description: samples,
+            length_ticks,
+            block_ticks: (LONGEST_BLOCK_S * samples.sample_rate_hz) as i64,
             noise: ChaCha8Rng::seed_from_u64(scene.seed),
             filter,
-            quantiser: Quantiser::new(scene.samples.format, rms)?,
+            quantiser: Quantiser::new(samples.format, rms)?,
             made: -reach,
             out: -2 * reach,
             planes: Planes::default(),
             bytes: Vec::new(),
             taken: 0,
-            modulators: scene
-                .signals
+            modulators: emitters
                 .into_iter()
-                .zip(amplitudes)
-                .map(|(signal, amplitude)| Modulator::new(signal, amplitude, sampling))
+                .map(|emitter| Modulator::new(emitter, scale, sampling))
                 .collect(),
         })
     }
@@ -146,6 +150,15 @@ impl Synthesiser {
             self.quantiser.finish(&mut self.bytes);
         }
     }
+}
+
+/// Amplitude of a signal over the square root of its C/N0 in Hz, where each component of the noise
+/// has unit variance.
+///
+/// Complex samples: C = A^2, N0 = 2 / fs. Real ones: C = A^2 / 2, N0 = 2 / fs.
+fn amplitude_scale(samples: &SampleDescription) -> f64 {
+    let complex = samples.format.is_complex();
+    (if complex { 2.0 } else { 4.0 } / samples.sample_rate_hz).sqrt()
 }
 
 impl SampleSource for Synthesiser {
