@@ -12,8 +12,8 @@ use gnss_signal::{AcquisitionHit, CorrelatorBank, IfCorrelatorBank, InstructionS
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::constellation;
 use crate::scenario::antenna::{Gain, Reception, Scene};
+use crate::scenario::constellation;
 use crate::scenario::emitter::PlainEmitter;
 use crate::scenario::if_signal::Synthesiser;
 use crate::scenario::message::Message;

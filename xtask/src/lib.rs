@@ -2,7 +2,6 @@
 
 pub mod ci;
 pub mod code_noise;
-pub mod constellation;
 pub mod demo;
 pub mod scenario;
 pub mod tidy;

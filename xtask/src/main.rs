@@ -1,6 +1,7 @@
 //! Command line of the project tasks.
 
 use std::io::{self, Write};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::Result;
@@ -8,6 +9,7 @@ use clap::{Parser, Subcommand};
 use xtask::ci::ci;
 use xtask::code_noise::{self, Experiment};
 use xtask::demo::demo;
+use xtask::scenario::command::{self as scenario, Command};
 use xtask::tidy::{Severity, tidy, workspace_root};
 
 #[derive(Debug, Parser)]
@@ -23,12 +25,18 @@ struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Task {
-    /// Make half a second of signal on the spot, receive it with rough aiding, judge the position.
+    /// The main job on an embedded default: make, receive, judge, draw
     Demo {
-        /// Seed of the noise.
-        #[arg(long, default_value_t = 1)]
-        seed: u64,
+        /// Seed in place of the scenario's
+        #[arg(long, value_name = "N")]
+        seed: Option<u64>,
+        /// Folder of the results
+        #[arg(long, value_name = "DIR", default_value = "target/demo")]
+        out: PathBuf,
     },
+    /// Signals with truth and faults: list, make, run
+    #[command(subcommand)]
+    Scenario(Command),
     /// Code tracking error at sample rates with and without an integer number of samples per chip.
     CodeNoise {
         /// C/N0 before the front end, dB-Hz.
@@ -75,10 +83,14 @@ const fn verdict(holds: bool) -> ExitCode {
 fn perform(task: Task) -> Result<ExitCode> {
     let mut out = io::stdout().lock();
     match task {
-        Task::Demo { seed } => {
-            let demo = demo(seed)?;
+        Task::Demo { seed, out: folder } => {
+            let demo = demo(seed, &folder)?;
             writeln!(out, "{demo}")?;
             Ok(verdict(demo.holds()))
+        }
+        Task::Scenario(command) => {
+            write!(out, "{}", scenario::perform(&command)?)?;
+            Ok(ExitCode::SUCCESS)
         }
         Task::CodeNoise {
             cn0,

@@ -13,6 +13,7 @@ pub mod progress;
 pub mod record;
 pub mod rinex_nav;
 pub mod samples;
+pub mod session;
 pub mod sigmf;
 pub mod sink;
 pub mod summary;

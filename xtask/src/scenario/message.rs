@@ -55,7 +55,7 @@ impl BitStream {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::constellation::nominal;
+    use crate::scenario::constellation::nominal;
 
     #[test]
     fn bits_are_those_of_the_encoder() {

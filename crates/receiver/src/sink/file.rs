@@ -63,6 +63,14 @@ impl OutputFile {
         })
     }
 
+    /// Writes bytes.
+    ///
+    /// # Errors
+    /// [`ReceiverError::File`], also after the file was committed.
+    pub fn write_bytes(&mut self, bytes: &[u8]) -> Result<(), ReceiverError> {
+        self.with_writer(|writer| writer.write_all(bytes))
+    }
+
     /// Writes out what is buffered and gives the file its name.
     ///
     /// # Errors

@@ -229,7 +229,7 @@ mod tests {
     use gnss_signal::SignalId;
 
     use super::*;
-    use crate::constellation::nominal;
+    use crate::scenario::constellation::nominal;
     use crate::scenario::emitter::PlainEmitter;
     use crate::scenario::message::Message;
     use crate::scenario::path::{SignalPath, UniformPath};

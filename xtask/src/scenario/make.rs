@@ -1,0 +1,178 @@
+//! `cargo xtask scenario make`: a scenario as files.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+use gnss_nav::Geodetic;
+use gnss_signal::Signal;
+use gnss_signal::sample::{SampleDescription, SampleSource};
+use receiver::sink::file::{OutputFile, create_directory};
+use serde_json::json;
+use toml::{Table, Value};
+
+use super::built::Scenario;
+use super::if_signal::Synthesiser;
+use super::spec::{IonosphereSpec, TroposphereSpec};
+use super::truth_files;
+
+/// Name of the samples.
+pub const SAMPLES_NAME: &str = "samples.bin";
+/// What an assisted receiver is told is rounded to this.
+const ROUGH_DEG: f64 = 0.1;
+const ROUGH_HEIGHT_M: f64 = 1000.0;
+const ROUGH_TIME_S: f64 = 10.0;
+
+/// At which level a signal is made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Level {
+    /// Intermediate-frequency samples
+    If,
+    /// Correlator sums, a thousand times faster
+    Correlator,
+}
+
+/// Writes samples with their SigMF sidecar, receiver.toml, truth.csv, satellites.csv, faults.csv and
+/// navigation.rnx to `directory`; at the correlator level, which has no samples, all but the first
+/// two.
+///
+/// The files appear when all are complete.
+///
+/// # Errors
+/// Where one cannot be written; nothing is left then.
+pub fn make(scenario: &Scenario, level: Level, directory: &Path) -> Result<()> {
+    let stage = Stage::open(directory)?;
+    truth_files::write(scenario, &stage.folder)?;
+    let mut file = OutputFile::create(&stage.folder, "receiver.toml")?;
+    write!(file, "{}", toml::to_string(&options(scenario))?)?;
+    file.commit()?;
+    if level == Level::If {
+        sidecar(&scenario.reception.samples, &stage.folder)?;
+        samples(scenario, &stage.folder)?;
+    }
+    stage.publish()
+}
+
+/// Options of `receiver run` for the samples of `scenario`, files relative to their folder.
+#[must_use]
+pub fn options(scenario: &Scenario) -> Table {
+    let samples = scenario.reception.samples;
+    let mut table = Table::new();
+    let mut set = |key: &str, value: Value| table.insert(key.to_owned(), value);
+    set("input", SAMPLES_NAME.into());
+    set("format", samples.format.name().into());
+    set("sample_rate", samples.sample_rate_hz.into());
+    set("if", samples.intermediate_frequency_hz.into());
+    set("swap_iq", samples.swap_iq.into());
+    set("truth", "truth.csv".into());
+    if scenario.propagation.ionosphere == IonosphereSpec::None {
+        set("ionosphere", "none".into());
+    }
+    if scenario.propagation.troposphere == TroposphereSpec::None {
+        set("troposphere", "none".into());
+    }
+    if scenario.receiver.assisted {
+        set("nav", "navigation.rnx".into());
+        set("position", rough_position(scenario).into());
+        set("time", rough_time(scenario).into());
+    }
+    table.extend(scenario.receiver.options.clone());
+    table
+}
+
+/// Where the receiver is, to a tenth of a degree.
+fn rough_position(scenario: &Scenario) -> String {
+    let place = Geodetic::from_ecef(&scenario.truth.trajectory.at(0.0).position_ecef_m);
+    let round = |value: f64, step: f64| (value / step).round() * step;
+    format!(
+        "{:.1},{:.1},{:.0}",
+        round(place.lat_rad.to_degrees(), ROUGH_DEG),
+        round(place.lon_rad.to_degrees(), ROUGH_DEG),
+        round(place.height_m, ROUGH_HEIGHT_M)
+    )
+}
+
+/// When it starts, to ten seconds.
+fn rough_time(scenario: &Scenario) -> String {
+    let start = scenario.truth.start;
+    let tow_s = (start.tow_s() / ROUGH_TIME_S).floor() * ROUGH_TIME_S;
+    format!("{}:{tow_s:.0}", start.week())
+}
+
+fn samples(scenario: &Scenario, folder: &Path) -> Result<()> {
+    let mut source = Synthesiser::new(scenario.scene())?;
+    let mut file = OutputFile::create(folder, SAMPLES_NAME)?;
+    let mut bytes = vec![0; 1 << 20];
+    loop {
+        match source.read(&mut bytes)? {
+            0 => return Ok(file.commit()?),
+            read => file.write_bytes(&bytes[..read])?,
+        }
+    }
+}
+
+/// The SigMF sidecar; names of its own for what SigMF has none.
+fn sidecar(samples: &SampleDescription, folder: &Path) -> Result<()> {
+    let format = samples.format.name();
+    // SigMF has names for whole bytes alone.
+    let datatype = match samples.format.bits_per_sample() / samples.format.components() {
+        bits if bits < 8 => "ru8",
+        _ => format,
+    };
+    let carrier_hz = Signal::GpsL1Ca.spec().carrier_hz;
+    let metadata = json!({
+        "global": {
+            "core:version": "1.0.0",
+            "core:datatype": datatype,
+            "core:sample_rate": samples.sample_rate_hz,
+            "gnss:format": format,
+            "gnss:if_hz": samples.intermediate_frequency_hz,
+            "gnss:swap_iq": samples.swap_iq,
+        },
+        "captures": [{
+            "core:sample_start": 0,
+            "core:frequency": carrier_hz - samples.intermediate_frequency_hz,
+        }],
+        "annotations": [],
+    });
+    let mut file = OutputFile::create(folder, &format!("{SAMPLES_NAME}.sigmf-meta"))?;
+    writeln!(file, "{metadata:#}")?;
+    Ok(file.commit()?)
+}
+
+/// A folder beside the one asked for, whose files move there when all are complete.
+struct Stage {
+    folder: PathBuf,
+    target: PathBuf,
+}
+
+impl Stage {
+    fn open(target: &Path) -> Result<Self> {
+        create_directory(target)?;
+        let folder = target.join(".part");
+        // Left by a run that was killed.
+        let _ = fs::remove_dir_all(&folder);
+        create_directory(&folder)?;
+        Ok(Self {
+            folder,
+            target: target.to_owned(),
+        })
+    }
+
+    fn publish(self) -> Result<()> {
+        let entries: io::Result<Vec<_>> = fs::read_dir(&self.folder)?.collect();
+        for entry in entries? {
+            let to = self.target.join(entry.file_name());
+            fs::rename(entry.path(), &to).with_context(|| to.display().to_string())?;
+        }
+        Ok(())
+    }
+}
+
+impl Drop for Stage {
+    fn drop(&mut self) {
+        // Nothing can be done about a failure here; the error that led here is reported.
+        let _ = fs::remove_dir_all(&self.folder);
+    }
+}
