@@ -190,6 +190,8 @@ pub struct MeasurementModel {
 pub struct Predicted {
     /// Range, minus the satellite's clock, plus modelled delays, m.
     pub pseudorange_m: f64,
+    /// Modelled delay of the code by ionosphere and troposphere, m.
+    pub delay_m: f64,
     /// Variance left by the modelled delays, m^2.
     pub delay_variance_m2: f64,
     /// Geometry.
@@ -219,10 +221,11 @@ impl MeasurementModel {
             0.0
         };
         let errors = &self.errors;
+        let delay_m = ionosphere_m + troposphere_m;
         Predicted {
             pseudorange_m: line_of_sight.range_m - SPEED_OF_LIGHT_MPS * state.clock_bias_s
-                + ionosphere_m
-                + troposphere_m,
+                + delay_m,
+            delay_m,
             delay_variance_m2: (errors.ionosphere_fraction * ionosphere_m).powi(2)
                 + errors.troposphere_variance_m2(troposphere_m, look.elevation_rad),
             line_of_sight,

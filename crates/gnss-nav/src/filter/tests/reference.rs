@@ -1,0 +1,75 @@
+//! The textbook in dense matrices: slow, and obviously what is meant.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::super::row::Row;
+use super::{Covariance, ErrorState};
+use crate::dynamics::ProcessNoise;
+
+/// F of Jiang2017 (10).
+fn transition(interval_s: f64) -> Covariance {
+    let mut f = Covariance::identity();
+    for i in 0..4 {
+        f[(2 * i, 2 * i + 1)] = interval_s;
+    }
+    f
+}
+
+/// Q of isotropic acceleration and a two-state clock.
+pub(super) fn noise(interval_s: f64, noise: &ProcessNoise) -> Covariance {
+    let t = interval_s;
+    let q_a = noise.acceleration.horizontal_m2_per_s3;
+    assert_eq!(q_a, noise.acceleration.vertical_m2_per_s3, "isotropic only");
+    let mut q = Covariance::zeros();
+    for i in 0..4 {
+        let density = if i < 3 {
+            q_a
+        } else {
+            noise.clock.random_walk_m2_per_s3
+        };
+        q[(2 * i, 2 * i)] = density * t.powi(3) / 3.0;
+        q[(2 * i, 2 * i + 1)] = density * t.powi(2) / 2.0;
+        q[(2 * i + 1, 2 * i)] = density * t.powi(2) / 2.0;
+        q[(2 * i + 1, 2 * i + 1)] = density * t;
+    }
+    q[(6, 6)] += noise.clock.white_m2_per_s * t;
+    q
+}
+
+/// F P F' + Q.
+pub(super) fn predict(p: &Covariance, interval_s: f64, process: &ProcessNoise) -> Covariance {
+    let f = transition(interval_s);
+    f * p * f.transpose() + noise(interval_s, process)
+}
+
+/// F x.
+pub(super) fn carry(x: &ErrorState, interval_s: f64) -> ErrorState {
+    transition(interval_s) * x
+}
+
+/// Equations (14), (15), (17) of Jiang2017, with a general inverse and Joseph's form.
+pub(super) fn update(
+    p: &Covariance,
+    h: &DMatrix<f64>,
+    y: &DVector<f64>,
+    r: &DVector<f64>,
+) -> (ErrorState, Covariance) {
+    let p = DMatrix::from_column_slice(8, 8, p.as_slice());
+    let r = DMatrix::from_diagonal(r);
+    let s = h * &p * h.transpose() + &r;
+    let k = &p * h.transpose() * s.try_inverse().unwrap();
+    let keep = DMatrix::identity(8, 8) - &k * h;
+    let after = &keep * &p * keep.transpose() + &k * &r * k.transpose();
+    (
+        ErrorState::from_column_slice((&k * y).as_slice()),
+        Covariance::from_column_slice(after.as_slice()),
+    )
+}
+
+/// The same from rows.
+pub(super) fn update_rows(p: &Covariance, rows: &[Row]) -> (ErrorState, Covariance) {
+    let h = DMatrix::from_fn(rows.len(), 8, |i, j| rows[i].dense()[j]);
+    let y = DVector::from_fn(rows.len(), |i, _| rows[i].residual);
+    let r = DVector::from_fn(rows.len(), |i, _| rows[i].variance);
+    update(p, &h, &y, &r)
+}
