@@ -1,6 +1,6 @@
 //! How a receiver and its oscillator may move between epochs: the process noise of the filters.
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 use crate::NavError;
 use crate::constants::{SPEED_OF_LIGHT_MPS, WGS84_ECCENTRICITY_SQUARED};
@@ -28,22 +28,11 @@ impl AccelerationNoise {
     ///
     /// u is normal to the ellipsoid through the point that has the shape of WGS-84, which is off
     /// the geodetic vertical by 6e-5 rad at 60 km.
-    pub(crate) fn density_ecef(&self, position_ecef_m: &Vector3<f64>) -> [[f64; 3]; 3] {
+    pub(crate) fn density_ecef(&self, position_ecef_m: &Vector3<f64>) -> Matrix3<f64> {
         let horizontal = self.horizontal_m2_per_s3;
         let difference = self.vertical_m2_per_s3 - horizontal;
-        let mut density = [[0.0; 3]; 3];
-        for (i, row) in density.iter_mut().enumerate() {
-            row[i] = horizontal;
-        }
-        if difference != 0.0 {
-            let up = vertical(position_ecef_m);
-            for (i, row) in density.iter_mut().enumerate() {
-                for (j, element) in row.iter_mut().enumerate() {
-                    *element += difference * (up[i] * up[j]);
-                }
-            }
-        }
-        density
+        let up = vertical(position_ecef_m);
+        Matrix3::from_diagonal_element(horizontal) + (up * up.transpose()) * difference
     }
 }
 
@@ -162,7 +151,6 @@ impl ProcessNoise {
 mod tests {
     use super::*;
     use crate::Geodetic;
-    use nalgebra::Matrix3;
 
     #[test]
     fn allan_coefficients_give_the_densities_of_the_textbook() {
@@ -194,7 +182,6 @@ mod tests {
         };
         let place = Geodetic::from_degrees(35.0, 118.9, 57_000.0);
         let density = noise.density_ecef(&place.to_ecef());
-        let density = Matrix3::from_fn(|i, j| density[i][j]);
         let enu = place.enu_from_ecef();
         let local = enu * density * enu.transpose();
         let expected = Matrix3::from_diagonal(&Vector3::new(4.0, 4.0, 0.25));
@@ -216,6 +203,6 @@ mod tests {
             vertical_m2_per_s3: 2.0,
         };
         let density = centre.density_ecef(&Vector3::zeros());
-        assert!(density.iter().flatten().all(|x| x.is_finite()));
+        assert!(density.iter().all(|x| x.is_finite()));
     }
 }

@@ -1,16 +1,16 @@
 //! What the two ways of taking in the measurements of an epoch have in common.
 
-use super::covariance::{self, Covariance, ErrorState};
+use super::covariance::{Blocks, ErrorState};
 use super::row::Row;
 use crate::NavError;
 
-/// State of the error after an update.
+/// What is known of the error of a prediction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Corrected {
-    /// Estimated error of the prediction.
+    /// Its estimate.
     pub(super) error: ErrorState,
-    /// Its covariance.
-    pub(super) covariance: Covariance,
+    /// Covariance of the estimate.
+    pub(super) covariance: Blocks,
     /// Sum over all measurements y' S^-1 y.
     pub(super) normalised_squared: f64,
     /// How many measurements.
@@ -19,7 +19,7 @@ pub(super) struct Corrected {
 
 impl Corrected {
     /// Before any measurement.
-    pub(super) fn prior(covariance: &Covariance) -> Self {
+    pub(super) fn prior(covariance: &Blocks) -> Self {
         Self {
             error: ErrorState::zeros(),
             covariance: *covariance,
@@ -31,8 +31,8 @@ impl Corrected {
     /// Whether nothing overflowed on the way.
     pub(super) fn is_finite(&self) -> bool {
         self.normalised_squared.is_finite()
-            && self.error.iter().all(|x| x.is_finite())
-            && covariance::has_variances(&self.covariance)
+            && self.error.is_finite()
+            && self.covariance.has_variances()
     }
 }
 
@@ -42,8 +42,6 @@ pub(super) trait Correct {
     ///
     /// # Errors
     /// [`NavError::Singular`] where an innovation has no positive variance.
-    fn correct(
-        covariance: &Covariance,
-        rows: impl Iterator<Item = Row>,
-    ) -> Result<Corrected, NavError>;
+    fn correct(covariance: &Blocks, rows: impl Iterator<Item = Row>)
+    -> Result<Corrected, NavError>;
 }

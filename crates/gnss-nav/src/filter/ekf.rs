@@ -2,12 +2,12 @@
 
 use std::marker::PhantomData;
 
-use nalgebra::{Cholesky, Vector3};
+use nalgebra::{Cholesky, Matrix4, Vector4};
 
 use super::NavFilter;
 use super::batch::Batch;
 use super::correction::{Correct, Corrected};
-use super::covariance::{self, Covariance, HALF};
+use super::covariance::{Blocks, Covariance};
 use super::disposition::{self, Disposition, SkipReason, Skipped, Update};
 use super::innovation::{Innovation, Innovations, SatelliteInnovation};
 use super::row::Row;
@@ -25,7 +25,7 @@ const UNKNOWN_DRIFT_MPS: f64 = 3_000.0;
 #[derive(Debug, Clone)]
 pub struct Ekf<Way> {
     state: NavState,
-    covariance: Covariance,
+    covariance: Blocks,
     settings: FilterSettings,
     way: PhantomData<Way>,
 }
@@ -60,7 +60,7 @@ impl<Way> Ekf<Way> {
         }
         Ok(Self {
             state,
-            covariance,
+            covariance: Blocks::from_interleaved(&covariance),
             settings,
             way: PhantomData,
         })
@@ -136,11 +136,11 @@ impl<Way> Ekf<Way> {
     }
 
     fn apply(&mut self, corrected: &Corrected) {
-        let x = &corrected.error;
-        self.state.position_ecef_m += Vector3::new(x[0], x[2], x[4]);
-        self.state.velocity_ecef_mps += Vector3::new(x[1], x[3], x[5]);
-        self.state.clock_bias_m += x[6];
-        self.state.clock_drift_mps += x[7];
+        let (offset, rate) = (&corrected.error.offset, &corrected.error.rate);
+        self.state.position_ecef_m += offset.xyz();
+        self.state.velocity_ecef_mps += rate.xyz();
+        self.state.clock_bias_m += offset.w;
+        self.state.clock_drift_mps += rate.w;
         self.covariance = corrected.covariance;
     }
 }
@@ -158,8 +158,8 @@ impl<Way: Correct> NavFilter for Ekf<Way> {
         &self.state
     }
 
-    fn covariance(&self) -> &Covariance {
-        &self.covariance
+    fn covariance(&self) -> Covariance {
+        self.covariance.interleaved()
     }
 
     fn predict(&mut self, to: GpsTime) -> Result<(), NavError> {
@@ -172,13 +172,12 @@ impl<Way: Correct> NavFilter for Ekf<Way> {
             });
         }
         let state = self.state.at(to);
-        let covariance = covariance::propagated(
-            &self.covariance,
+        let covariance = self.covariance.propagated(
             interval_s,
             &self.settings.process_noise,
             &state.position_ecef_m,
         );
-        if !(state.is_finite() && covariance::has_variances(&covariance)) {
+        if !(state.is_finite() && covariance.has_variances()) {
             return Err(NavError::Singular);
         }
         self.state = state;
@@ -230,22 +229,20 @@ fn is_positive_definite(covariance: &Covariance) -> bool {
 }
 
 fn covariance_of(solution: &Solution) -> Covariance {
-    let mut covariance = Covariance::zeros();
-    for i in 0..HALF {
-        for j in 0..HALF {
-            covariance[(2 * i, 2 * j)] = solution.covariance_m2[(i, j)];
-            if let Some(velocity) = &solution.velocity {
-                covariance[(2 * i + 1, 2 * j + 1)] = velocity.covariance_m2_s2[(i, j)];
-            }
-        }
-        if solution.velocity.is_none() {
-            let sigma = if i == 3 {
-                UNKNOWN_DRIFT_MPS
-            } else {
-                UNKNOWN_VELOCITY_MPS
-            };
-            covariance[(2 * i + 1, 2 * i + 1)] = sigma * sigma;
-        }
+    let unknown = Vector4::new(
+        UNKNOWN_VELOCITY_MPS,
+        UNKNOWN_VELOCITY_MPS,
+        UNKNOWN_VELOCITY_MPS,
+        UNKNOWN_DRIFT_MPS,
+    );
+    let rate = solution.velocity.map_or_else(
+        || Matrix4::from_diagonal(&unknown.map(|sigma| sigma * sigma)),
+        |velocity| velocity.covariance_m2_s2,
+    );
+    Blocks {
+        offset: solution.covariance_m2,
+        cross: Matrix4::zeros(),
+        rate,
     }
-    covariance
+    .interleaved()
 }

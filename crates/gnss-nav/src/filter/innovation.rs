@@ -1,6 +1,8 @@
 //! Innovations: what a filter did not expect of the measurements of an epoch.
 
-use super::covariance::Covariance;
+use nalgebra::Vector4;
+
+use super::covariance::Blocks;
 use super::row::{Observable, Row};
 use crate::constants::SPEED_OF_LIGHT_MPS;
 use crate::geodesy::Look;
@@ -19,7 +21,7 @@ pub struct Innovation {
 }
 
 impl Innovation {
-    fn new(row: Row, covariance: &Covariance) -> Self {
+    fn new(row: Row, covariance: &Blocks) -> Self {
         Self {
             row,
             state_variance: row.state_variance(covariance),
@@ -87,7 +89,7 @@ impl Innovations {
     pub(super) fn new(
         measurements: &[Measurement],
         predicted: &NavState,
-        covariance: &Covariance,
+        covariance: &Blocks,
         model: &MeasurementModel,
     ) -> Result<Self, NavError> {
         let satellites = measurements
@@ -110,11 +112,11 @@ impl Innovations {
 fn innovation(
     measurement: &Measurement,
     predicted: &NavState,
-    covariance: &Covariance,
+    covariance: &Blocks,
     model: &MeasurementModel,
 ) -> Result<SatelliteInnovation, NavError> {
     let late_s = measurement.receive_time - predicted.receiver_clock();
-    if !(late_s.abs() <= EPOCH_TOLERANCE_S) {
+    if late_s.is_nan() || late_s.abs() > EPOCH_TOLERANCE_S {
         return Err(NavError::Value {
             name: "epoch of a measurement minus that of the filter, s",
             value: late_s.to_string(),
@@ -160,7 +162,7 @@ fn code_row(
     let e = expected.line_of_sight.unit_ecef;
     Row {
         observable: Observable::Pseudorange,
-        gradient: [-e.x, -e.y, -e.z, 1.0],
+        gradient: Vector4::new(-e.x, -e.y, -e.z, 1.0),
         residual: measurement.pseudorange_m - expected.pseudorange_m - state.clock_bias_m,
         variance: model.variance_m2(
             measurement.pseudorange_variance_m2,
@@ -183,7 +185,7 @@ fn rate_row(measurement: &Measurement, state: &NavState, expected: &Predicted) -
         - SPEED_OF_LIGHT_MPS * measurement.state.clock_drift;
     Row {
         observable: Observable::RangeRate,
-        gradient: [g.x, g.y, g.z, 1.0],
+        gradient: Vector4::new(g.x, g.y, g.z, 1.0),
         residual: measurement.range_rate_mps - predicted_mps,
         variance: measurement.range_rate_variance_m2,
     }

@@ -65,7 +65,7 @@ pub trait NavFilter {
     fn state(&self) -> &NavState;
 
     /// Covariance of its error.
-    fn covariance(&self) -> &Covariance;
+    fn covariance(&self) -> Covariance;
 
     /// Carries state and covariance to GPS time `to`, not before the present.
     ///

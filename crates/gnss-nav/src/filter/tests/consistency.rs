@@ -4,8 +4,6 @@ use nalgebra::Cholesky;
 use rand::SeedableRng;
 
 use super::super::batch::Batch;
-use super::super::correction::{Correct, Corrected};
-use super::super::covariance;
 use super::super::sequential::Sequential;
 use super::*;
 use crate::chi_square_threshold;
@@ -45,21 +43,22 @@ fn run<Way: Correct>(satellites: usize, seed: u64) -> Vec<(f64, f64)> {
     (0..EPOCHS)
         .map(|_| {
             error = reference::carry(&error, interval_s) - draw(&q, &mut rng);
-            p = covariance::propagated(&p, interval_s, &noise, &position);
+            p = Blocks::from_interleaved(&p)
+                .propagated(interval_s, &noise, &position)
+                .interleaved();
             let rows = measured(random_rows(satellites, &mut rng), &error, &mut rng);
-            let corrected = Way::correct(&p, rows.into_iter()).unwrap();
-            error += corrected.error;
-            p = corrected.covariance;
-            let nees = error.dot(&Cholesky::new(p).unwrap().solve(&error));
-            (nees, corrected.normalised_squared)
+            let (correction, after, nis) = correct::<Way>(&p, &rows);
+            error += correction;
+            p = after;
+            (error.dot(&Cholesky::new(p).unwrap().solve(&error)), nis)
         })
         .collect()
 }
 
 /// `rows` with the residuals an estimate wrong by `error` leaves.
-fn measured(mut rows: Vec<Row>, error: &ErrorState, rng: &mut ChaCha8Rng) -> Vec<Row> {
+fn measured(mut rows: Vec<Row>, error: &States, rng: &mut ChaCha8Rng) -> Vec<Row> {
     for row in &mut rows {
-        row.residual = row.variance.sqrt() * normal(rng) - row.dense().dot(error);
+        row.residual = row.variance.sqrt() * normal(rng) - dense(row).dot(error);
     }
     rows
 }
@@ -112,17 +111,18 @@ fn the_covariance_stays_positive_definite_over_a_million_updates() {
     let noise = ungated().process_noise;
     let position = made_up_sky::receiver().position_ecef_m;
     let epochs: Vec<Vec<Row>> = (0..64).map(|_| random_rows(8, &mut rng)).collect();
-    let mut corrected = Corrected::prior(&(Covariance::identity() * 1e10));
+    let prior = Blocks::from_interleaved(&(Covariance::identity() * 1e10));
+    let mut corrected = Corrected::prior(&prior);
     // 16 scalar updates an epoch.
     for epoch in 0..62_500 {
-        let p = covariance::propagated(&corrected.covariance, 0.02, &noise, &position);
+        let p = corrected.covariance.propagated(0.02, &noise, &position);
         let rows = epochs[epoch % epochs.len()].iter().copied();
         corrected = Sequential::correct(&p, rows).unwrap();
         if epoch % 500 == 0 {
-            let p = corrected.covariance;
+            let p = corrected.covariance.interleaved();
             assert_eq!(p, p.transpose(), "epoch {epoch}");
             assert!(Cholesky::new(p).is_some(), "epoch {epoch}: {p}");
         }
     }
-    assert!(corrected.covariance.iter().all(|x| x.is_finite()));
+    assert!(corrected.is_finite());
 }

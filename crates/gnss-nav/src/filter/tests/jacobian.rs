@@ -25,7 +25,7 @@ fn both_models() -> [FilterSettings; 2] {
 fn innovations(settings: &FilterSettings, index: usize, step: f64) -> Innovations {
     let store = constellation(&mut ChaCha8Rng::seed_from_u64(1));
     let measurements = measure(&store, &receiver(), &settings.model);
-    let mut error = ErrorState::zeros();
+    let mut error = States::zeros();
     error[index] = step;
     let filter: SequentialFilter = start(displaced(&receiver(), &error), *settings);
     filter.innovations(&measurements).unwrap()
@@ -67,13 +67,13 @@ fn assert_derivatives(settings: &FilterSettings, index: usize, allowed: f64) {
     for (k, one) in at.satellites.iter().enumerate() {
         let (a, b) = (&ahead.satellites[k], &behind.satellites[k]);
         let code = (b.code.value() - a.code.value()) / (2.0 * step);
-        let difference = (code - one.code.row().dense()[index]).abs();
+        let difference = (code - one.code.row().element(index)).abs();
         assert!(difference < allowed, "code by {index}: {difference}");
         let (a, b, row) = (a.rate.unwrap(), b.rate.unwrap(), one.rate.unwrap());
         let rate = (b.value() - a.value()) / (2.0 * step);
-        let difference = (rate - row.row().dense()[index]).abs();
+        let difference = (rate - row.row().element(index)).abs();
         // By position the turn of the line of sight, left out; else rounding of 1 km/s over 20.
-        let allowed = if index % 2 == 0 { 2e-4 } else { 1e-10 };
+        let allowed = if index.is_multiple_of(2) { 2e-4 } else { 1e-10 };
         assert!(difference < allowed, "rate by {index}: {difference}");
     }
 }

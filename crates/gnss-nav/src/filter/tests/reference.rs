@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::super::row::Row;
-use super::{Covariance, ErrorState};
+use super::{Covariance, States};
 use crate::dynamics::ProcessNoise;
 
 /// F of Jiang2017 (10).
@@ -43,7 +43,7 @@ pub(super) fn predict(p: &Covariance, interval_s: f64, process: &ProcessNoise) -
 }
 
 /// F x.
-pub(super) fn carry(x: &ErrorState, interval_s: f64) -> ErrorState {
+pub(super) fn carry(x: &States, interval_s: f64) -> States {
     transition(interval_s) * x
 }
 
@@ -53,7 +53,7 @@ pub(super) fn update(
     h: &DMatrix<f64>,
     y: &DVector<f64>,
     r: &DVector<f64>,
-) -> (ErrorState, Covariance) {
+) -> (States, Covariance) {
     let p = DMatrix::from_column_slice(8, 8, p.as_slice());
     let r = DMatrix::from_diagonal(r);
     let s = h * &p * h.transpose() + &r;
@@ -61,14 +61,14 @@ pub(super) fn update(
     let keep = DMatrix::identity(8, 8) - &k * h;
     let after = &keep * &p * keep.transpose() + &k * &r * k.transpose();
     (
-        ErrorState::from_column_slice((&k * y).as_slice()),
+        States::from_column_slice((&k * y).as_slice()),
         Covariance::from_column_slice(after.as_slice()),
     )
 }
 
 /// The same from rows.
-pub(super) fn update_rows(p: &Covariance, rows: &[Row]) -> (ErrorState, Covariance) {
-    let h = DMatrix::from_fn(rows.len(), 8, |i, j| rows[i].dense()[j]);
+pub(super) fn update_rows(p: &Covariance, rows: &[Row]) -> (States, Covariance) {
+    let h = DMatrix::from_fn(rows.len(), 8, |i, j| rows[i].element(j));
     let y = DVector::from_fn(rows.len(), |i, _| rows[i].residual);
     let r = DVector::from_fn(rows.len(), |i, _| rows[i].variance);
     update(p, &h, &y, &r)

@@ -21,7 +21,7 @@ fn refused(attempt: impl Fn(&mut dyn NavFilter) -> Result<(), NavError>) -> NavE
     let errors = filters.map(|filter| {
         let error = attempt(filter).unwrap_err();
         assert_eq!(*filter.state(), receiver());
-        assert_eq!(*filter.covariance(), settled());
+        assert_eq!(filter.covariance(), settled());
         error
     });
     errors.into_iter().next().unwrap()

@@ -4,7 +4,6 @@ use rand::SeedableRng;
 use rand::seq::SliceRandom;
 
 use super::super::NavFilter;
-use super::super::correction::Correct;
 use super::*;
 use crate::filter::{BatchFilter, Disposition, SequentialFilter, SkipReason, Skipped};
 use crate::made_up_sky::{constellation, measure, receiver};
@@ -95,7 +94,7 @@ fn both_filters_agree_epoch_after_epoch() {
         let away = batch.state().position_ecef_m - sequential.state().position_ecef_m;
         // Coordinates of 4e6 m step by 5e-10 m.
         assert!(away.norm() < 1e-8, "{away}");
-        assert!(covariance_difference(batch.covariance(), sequential.covariance()) < 1e-9);
+        assert!(covariance_difference(&batch.covariance(), &sequential.covariance()) < 1e-9);
     }
 }
 
