@@ -5,7 +5,6 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use crate::measurement::{self, RawMeasurement};
-use crate::prediction::predict_through;
 use crate::{
     Ephemeris, EphemerisStore, Geodetic, GpsTime, Measurement, MeasurementModel, NavState,
     SatelliteId,
@@ -82,7 +81,7 @@ pub(crate) fn measure(
     let raw: Vec<RawMeasurement> = store
         .iter()
         .filter_map(|ephemeris| {
-            let expected = predict_through(ephemeris, &receiver.into(), model).ok()?;
+            let expected = receiver.expect(ephemeris, receive_time, model).ok()?;
             (expected.look.elevation_rad > 10f64.to_radians()).then(|| RawMeasurement {
                 satellite: ephemeris.satellite,
                 transmit_time: expected.transmit_time,

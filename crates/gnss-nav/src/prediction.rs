@@ -123,3 +123,81 @@ pub(crate) fn received_state(
     }
     Ok((state, path))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Klobuchar;
+    use crate::made_up_sky::{constellation, receiver};
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+
+    fn through_air() -> MeasurementModel {
+        MeasurementModel {
+            ionosphere: Some(Klobuchar {
+                alpha: [1.77e-8, -7.451e-9, -5.96e-8, 1.192e-7],
+                beta: [131_100.0, -131_100.0, 65_540.0, -262_100.0],
+            }),
+            troposphere: true,
+            ..MeasurementModel::default()
+        }
+    }
+
+    /// What is expected of every satellite above 10 degrees when the receiver's clock has gone on
+    /// by `later_s`.
+    fn expected(later_s: f64, model: &MeasurementModel) -> Vec<Expected> {
+        let state = receiver();
+        let clock = state.receiver_clock() + later_s;
+        constellation(&mut ChaCha8Rng::seed_from_u64(1))
+            .iter()
+            .map(|ephemeris| state.expect(ephemeris, clock, model).unwrap())
+            .filter(|e| e.look.elevation_rad > 10f64.to_radians())
+            .collect()
+    }
+
+    #[test]
+    fn code_and_carrier_run_at_the_predicted_rates() {
+        let model = MeasurementModel::geometry_only();
+        let (before, now, after) = (
+            expected(-0.5, &model),
+            expected(0.0, &model),
+            expected(0.5, &model),
+        );
+        assert!(now.len() >= 6);
+        for ((b, n), a) in before.iter().zip(&now).zip(&after) {
+            // Transmit time that passes in a second of the receiver's clock, 1 - range rate / c.
+            let per_second = a.transmit_time - b.transmit_time;
+            let code_hz = CA_CODE_RATE_HZ * per_second;
+            // The product of range rate and drift, 0.2 mm/s here, and 1e-16 s of a time.
+            let allowed_mps = 1e-3;
+            let allowed_hz = CA_CODE_RATE_HZ * allowed_mps / SPEED_OF_LIGHT_MPS;
+            assert!((code_hz - n.code_rate_hz()).abs() < allowed_hz);
+            let doppler_hz = (per_second - 1.0) * crate::constants::L1_HZ;
+            assert!((doppler_hz - n.doppler_hz).abs() < allowed_mps / L1_WAVELENGTH_M);
+        }
+    }
+
+    #[test]
+    fn the_code_phase_is_that_of_the_transmit_time() {
+        for one in expected(0.0, &through_air()) {
+            let chips = one.code_phase_chips();
+            assert!((0.0..1023.0).contains(&chips));
+            let periods = one.transmit_time.fraction_s() * 1e3 - chips / 1023.0;
+            // 1e3 periods of a second round to 1e-13.
+            assert!((periods - periods.round()).abs() < 1e-9, "{periods}");
+        }
+    }
+
+    #[test]
+    fn the_air_holds_back_the_code_and_nothing_else() {
+        let empty = expected(0.0, &MeasurementModel::geometry_only());
+        for (air, none) in expected(0.0, &through_air()).iter().zip(&empty) {
+            assert!((2.0..60.0).contains(&air.delay_m), "{}", air.delay_m);
+            assert_eq!(none.delay_m, 0.0);
+            let later_s = none.transmit_time - air.transmit_time;
+            // A time of the fraction of a second rounds to 1e-16 s.
+            assert!((later_s * SPEED_OF_LIGHT_MPS - air.delay_m).abs() < 1e-6);
+            assert_eq!(air.doppler_hz, none.doppler_hz);
+        }
+    }
+}

@@ -3,8 +3,8 @@
 use nalgebra::Vector3;
 
 use crate::constants::SPEED_OF_LIGHT_MPS;
-use crate::prediction::ReceiverState;
-use crate::{GpsTime, Solution};
+use crate::prediction::{Expected, ReceiverState, predict_through};
+use crate::{Ephemeris, GpsTime, MeasurementModel, NavError, Solution};
 
 /// Position, velocity, clock bias and clock drift of a receiver.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -46,6 +46,22 @@ impl NavState {
             clock_bias_m: self.clock_bias_m + self.clock_drift_mps * interval_s,
             ..*self
         }
+    }
+
+    /// What this receiver expects of the satellite of `ephemeris` when its clock reads
+    /// `receiver_clock`: transmit time and code phase, code rate and Doppler to steer a channel by
+    /// (equations (1) to (4) of Jiang2017), through the delays of `model`.
+    ///
+    /// # Errors
+    /// As [`predict_through`].
+    pub fn expect(
+        &self,
+        ephemeris: &Ephemeris,
+        receiver_clock: GpsTime,
+        model: &MeasurementModel,
+    ) -> Result<Expected, NavError> {
+        let there = self.at(self.gps_time(receiver_clock));
+        predict_through(ephemeris, &ReceiverState::from(&there), model)
     }
 
     pub(crate) fn is_finite(&self) -> bool {

@@ -92,9 +92,10 @@ impl Innovations {
         covariance: &Blocks,
         model: &MeasurementModel,
     ) -> Result<Self, NavError> {
+        let here = model.at(&predicted.position_ecef_m, predicted.time);
         let satellites = measurements
             .iter()
-            .map(|m| innovation(m, predicted, covariance, model))
+            .map(|m| innovation(m, predicted, &here.predict(&m.state), covariance, model))
             .collect::<Result<_, _>>()?;
         Ok(Self {
             predicted: *predicted,
@@ -112,6 +113,7 @@ impl Innovations {
 fn innovation(
     measurement: &Measurement,
     predicted: &NavState,
+    expected: &Predicted,
     covariance: &Blocks,
     model: &MeasurementModel,
 ) -> Result<SatelliteInnovation, NavError> {
@@ -123,20 +125,15 @@ fn innovation(
             expected: "no more than 2 ms either way: predict to the epoch first",
         });
     }
-    let expected = model.predict(
-        &measurement.state,
-        &predicted.position_ecef_m,
-        predicted.time,
-    );
     let code = checked(
-        code_row(measurement, predicted, &expected, model),
+        code_row(measurement, predicted, expected, model),
         measurement,
     )?;
     let rate = if measurement.range_rate_variance_m2.is_infinite() {
         None
     } else {
         Some(checked(
-            rate_row(measurement, predicted, &expected),
+            rate_row(measurement, predicted, expected),
             measurement,
         )?)
     };
@@ -179,7 +176,7 @@ fn code_row(
 /// the range, at most 4 km/s over 2e7 m = 2e-4 1/s: 2 mm/s for a position wrong by 10 m, a
 /// thirtieth of the noise of 20 ms at 45 dB-Hz.
 fn rate_row(measurement: &Measurement, state: &NavState, expected: &Predicted) -> Row {
-    let path = &expected.line_of_sight;
+    let path = expected.line_of_sight;
     let g = path.range_rate_gradient();
     let predicted_mps = path.range_rate_mps(&state.velocity_ecef_mps) + state.clock_drift_mps
         - SPEED_OF_LIGHT_MPS * measurement.state.clock_drift;
