@@ -13,7 +13,7 @@ use super::innovation::{Innovation, Innovations, SatelliteInnovation};
 use super::row::Row;
 use super::sequential::Sequential;
 use super::settings::{FilterSettings, Gate};
-use crate::{GpsTime, Measurement, NavError, NavState, Solution};
+use crate::{GpsTime, Measurement, NavError, NavState, SatelliteId, Solution};
 
 /// Standard deviation per axis of a velocity nothing is known of, m/s: aircraft are within it.
 const UNKNOWN_VELOCITY_MPS: f64 = 300.0;
@@ -105,7 +105,7 @@ impl<Way> Ekf<Way> {
     fn select<'a>(
         &'a self,
         innovations: &'a Innovations,
-        dispositions: &'a [(crate::SatelliteId, Disposition)],
+        dispositions: &'a [(SatelliteId, Disposition)],
         skipped: &'a mut Vec<Skipped>,
     ) -> impl Iterator<Item = Row> + 'a {
         let both = innovations.satellites.iter().flat_map(move |s| {
@@ -197,7 +197,7 @@ impl<Way: Correct> NavFilter for Ekf<Way> {
     fn update(
         &mut self,
         innovations: &Innovations,
-        dispositions: &[(crate::SatelliteId, Disposition)],
+        dispositions: &[(SatelliteId, Disposition)],
     ) -> Result<Update, NavError> {
         if innovations.predicted != self.state {
             return Err(NavError::StaleInnovations);

@@ -36,7 +36,7 @@ fn run<Way: Correct>(satellites: usize, seed: u64) -> Vec<(f64, f64)> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let (interval_s, noise) = (0.1, ungated().process_noise);
     let position = made_up_sky::receiver().position_ecef_m;
-    let q = reference::noise(interval_s, &noise);
+    let q = reference::noise(interval_s, &noise, &position);
     let mut p = settled();
     // Error of the estimate: estimate minus truth.
     let mut error = draw(&p, &mut rng);

@@ -1,9 +1,10 @@
 //! The textbook in dense matrices: slow, and obviously what is meant.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::super::row::Row;
 use super::{Covariance, States};
+use crate::Geodetic;
 use crate::dynamics::ProcessNoise;
 
 /// F of Jiang2017 (10).
@@ -15,31 +16,43 @@ fn transition(interval_s: f64) -> Covariance {
     f
 }
 
-/// Q of isotropic acceleration and a two-state clock.
-pub(super) fn noise(interval_s: f64, noise: &ProcessNoise) -> Covariance {
+/// Q of acceleration in the local frame of `position_ecef_m` and a two-state clock.
+pub(super) fn noise(
+    interval_s: f64,
+    noise: &ProcessNoise,
+    position_ecef_m: &Vector3<f64>,
+) -> Covariance {
     let t = interval_s;
-    let q_a = noise.acceleration.horizontal_m2_per_s3;
-    assert_eq!(q_a, noise.acceleration.vertical_m2_per_s3, "isotropic only");
-    let mut q = Covariance::zeros();
-    for i in 0..4 {
-        let density = if i < 3 {
-            q_a
-        } else {
-            noise.clock.random_walk_m2_per_s3
+    let (horizontal, vertical) = (
+        noise.acceleration.horizontal_m2_per_s3,
+        noise.acceleration.vertical_m2_per_s3,
+    );
+    let enu = Geodetic::from_ecef(position_ecef_m).enu_from_ecef();
+    let local = Vector3::new(horizontal, horizontal, vertical);
+    let acceleration = enu.transpose() * Matrix3::from_diagonal(&local) * enu;
+    let mut density = acceleration.to_homogeneous();
+    density[(3, 3)] = noise.clock.random_walk_m2_per_s3;
+    let mut q = Covariance::from_fn(|i, j| {
+        let integral = match (i % 2, j % 2) {
+            (0, 0) => t.powi(3) / 3.0,
+            (1, 1) => t,
+            _ => t.powi(2) / 2.0,
         };
-        q[(2 * i, 2 * i)] = density * t.powi(3) / 3.0;
-        q[(2 * i, 2 * i + 1)] = density * t.powi(2) / 2.0;
-        q[(2 * i + 1, 2 * i)] = density * t.powi(2) / 2.0;
-        q[(2 * i + 1, 2 * i + 1)] = density * t;
-    }
+        density[(i / 2, j / 2)] * integral
+    });
     q[(6, 6)] += noise.clock.white_m2_per_s * t;
     q
 }
 
 /// F P F' + Q.
-pub(super) fn predict(p: &Covariance, interval_s: f64, process: &ProcessNoise) -> Covariance {
+pub(super) fn predict(
+    p: &Covariance,
+    interval_s: f64,
+    process: &ProcessNoise,
+    position_ecef_m: &Vector3<f64>,
+) -> Covariance {
     let f = transition(interval_s);
-    f * p * f.transpose() + noise(interval_s, process)
+    f * p * f.transpose() + noise(interval_s, process, position_ecef_m)
 }
 
 /// F x.
