@@ -12,6 +12,9 @@ use crate::NavError;
 /// s = h' P h + r, k = P h / s, x += k (y - h' x), P -= k h' P. Noises of different measurements
 /// are independent, so that the result does not depend on the order. Nothing is allocated, the
 /// four zeros of every row are skipped, and of the symmetric P three blocks of four are kept.
+///
+/// P - k h' P loses the digits by which the prior variance exceeds that of the noise: 13 of the 16
+/// of a float, as from 1e10 m^2 against 1e-3 m^2, still leave P positive definite.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Sequential;
 
