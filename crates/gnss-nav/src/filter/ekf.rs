@@ -93,10 +93,18 @@ impl<Way> Ekf<Way> {
         }
     }
 
-    fn passes_gate(&self, innovation: &Innovation) -> bool {
+    /// The row of `innovation`, or why it is skipped.
+    fn judge(&self, innovation: &Innovation, decision: Decision) -> Result<Row, SkipReason> {
+        let factor = match decision {
+            Decision::Skip(reason) => return Err(reason),
+            Decision::Test(factor) => factor,
+        };
+        let weighted = innovation.deweighted(factor);
         match self.settings.gate {
-            Gate::Off => true,
-            Gate::Sigmas(sigmas) => innovation.normalised_squared() <= sigmas * sigmas,
+            Gate::Sigmas(sigmas) if weighted.normalised_squared() > sigmas * sigmas => {
+                Err(SkipReason::Gate)
+            }
+            Gate::Off | Gate::Sigmas(_) => Ok(*weighted.row()),
         }
     }
 
@@ -116,22 +124,15 @@ impl<Way> Ekf<Way> {
                 .map(move |innovation| (s.satellite, innovation, decision))
         });
         both.filter_map(move |(satellite, innovation, decision)| {
-            let reason = match decision {
-                Decision::Skip(reason) => reason,
-                Decision::Test(factor) => {
-                    let weighted = innovation.deweighted(factor);
-                    if self.passes_gate(&weighted) {
-                        return Some(*weighted.row());
-                    }
-                    SkipReason::Gate
-                }
-            };
-            skipped.push(Skipped {
-                satellite,
-                observable: innovation.row().observable,
-                reason,
-            });
-            None
+            self.judge(&innovation, decision)
+                .map_err(|reason| {
+                    skipped.push(Skipped {
+                        satellite,
+                        observable: innovation.row().observable,
+                        reason,
+                    });
+                })
+                .ok()
         })
     }
 
