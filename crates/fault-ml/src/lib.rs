@@ -4,7 +4,7 @@
 //! of all satellites. Both state a score and the threshold it is held against: faulty is exactly
 //! a score above its threshold. What to do about it is for others to decide.
 //!
-//! This version holds the traits and the values that cross them; it has no monitor of its own yet.
+//! [`InnovationTest`] is the first monitor: it needs no training.
 //!
 //! ```
 //! use fault_ml::{Cadence, ChannelMonitor, ChannelVerdict, Innovation, Judgement, MonitorError};
@@ -46,11 +46,14 @@
 #![cfg_attr(doctest, doc = include_str!("../README.md"))]
 
 mod channel;
+mod crossing_rate;
 mod error;
+mod innovation_test;
 mod integrity;
 mod judgement;
 
 pub use channel::{Cadence, ChannelMonitor, ChannelVerdict, Innovation};
 pub use error::MonitorError;
+pub use innovation_test::{InnovationStatistic, InnovationTest, InnovationTestSettings};
 pub use integrity::{IntegrityMonitor, IntegrityReport, SatelliteMeasurement};
 pub use judgement::{Health, Judgement};

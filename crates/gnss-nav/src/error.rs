@@ -47,6 +47,22 @@ pub enum NavError {
         /// Iterations made.
         iterations: usize,
     },
+    /// A measurement a filter cannot take.
+    #[error(
+        "innovation of {satellite} is {residual} with a noise variance of {variance}: \
+         expected finite values and a variance above 0"
+    )]
+    Measurement {
+        /// Whose.
+        satellite: SatelliteId,
+        /// Measured minus predicted, m or m/s.
+        residual: f64,
+        /// Variance given to the measurement, m^2 or (m/s)^2.
+        variance: f64,
+    },
+    /// Innovations that were not formed against the present state of the filter.
+    #[error("the filter has moved since these innovations were formed: form them again")]
+    StaleInnovations,
     /// No millisecond ambiguities near the prior make the measurements agree.
     #[error("{satellites} code phases agree with no position and time near the prior")]
     NoFit {

@@ -91,16 +91,7 @@ impl Geodetic {
     /// Where the direction `unit_ecef` (from this point) is in its sky.
     #[must_use]
     pub fn look(&self, unit_ecef: &Vector3<f64>) -> Look {
-        let enu = self.enu_from_ecef() * unit_ecef;
-        let azimuth = enu.x.atan2(enu.y);
-        Look {
-            azimuth_rad: if azimuth < 0.0 {
-                azimuth + std::f64::consts::TAU
-            } else {
-                azimuth
-            },
-            elevation_rad: enu.z.atan2(enu.x.hypot(enu.y)),
-        }
+        Look::towards(&(self.enu_from_ecef() * unit_ecef))
     }
 
     /// Angle by which the horizon lies below the horizontal, rad; zero on and below the ground.
@@ -121,6 +112,21 @@ pub struct Look {
     pub azimuth_rad: f64,
     /// Above the horizontal, rad.
     pub elevation_rad: f64,
+}
+
+impl Look {
+    /// The direction of `enu` (east, north, up).
+    pub(crate) fn towards(enu: &Vector3<f64>) -> Self {
+        let azimuth = enu.x.atan2(enu.y);
+        Self {
+            azimuth_rad: if azimuth < 0.0 {
+                azimuth + std::f64::consts::TAU
+            } else {
+                azimuth
+            },
+            elevation_rad: enu.z.atan2(enu.x.hypot(enu.y)),
+        }
+    }
 }
 
 fn latitude_rad(equatorial_m: f64, z_m: f64) -> f64 {

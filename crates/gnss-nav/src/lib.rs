@@ -1,4 +1,4 @@
-//! GNSS navigation: LNAV, orbits, frames, measurements, least squares. Never sees a sample.
+//! GNSS navigation: LNAV, orbits, frames, measurements, least squares, Kalman filters. Never sees a sample.
 //!
 #![doc = include_str!("../README.md")]
 
@@ -7,17 +7,23 @@ mod calendar;
 mod chi_square;
 pub mod coarse_time;
 pub mod constants;
+pub mod dynamics;
 pub mod ephemeris;
 mod error;
+pub mod filter;
 pub mod geodesy;
 pub mod least_squares;
 mod line_of_sight;
 mod linear;
 pub mod lnav;
+#[cfg(test)]
+mod made_up_sky;
 pub mod measurement;
 pub mod prediction;
 mod satellite;
+mod state;
 pub mod time;
+pub mod tracking_noise;
 
 pub use atmosphere::{Klobuchar, saastamoinen_delay_m};
 pub use calendar::Calendar;
@@ -29,4 +35,5 @@ pub use least_squares::Solution;
 pub use line_of_sight::LineOfSight;
 pub use measurement::{Measurement, MeasurementModel, RawMeasurement};
 pub use satellite::{SatelliteId, System};
+pub use state::NavState;
 pub use time::GpsTime;

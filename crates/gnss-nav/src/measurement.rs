@@ -1,6 +1,6 @@
 //! Pseudoranges and range rates, and the model that predicts them.
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 use crate::atmosphere::{Klobuchar, saastamoinen_delay_m};
 use crate::constants::SPEED_OF_LIGHT_MPS;
@@ -190,6 +190,8 @@ pub struct MeasurementModel {
 pub struct Predicted {
     /// Range, minus the satellite's clock, plus modelled delays, m.
     pub pseudorange_m: f64,
+    /// Modelled delay of the code by ionosphere and troposphere, m.
+    pub delay_m: f64,
     /// Variance left by the modelled delays, m^2.
     pub delay_variance_m2: f64,
     /// Geometry.
@@ -207,26 +209,19 @@ impl MeasurementModel {
         receiver_ecef_m: &Vector3<f64>,
         time: GpsTime,
     ) -> Predicted {
-        let line_of_sight = LineOfSight::new(state, receiver_ecef_m);
+        self.at(receiver_ecef_m, time).predict(state)
+    }
+
+    /// This model for a receiver at `receiver_ecef_m` at about `time`: what all satellites seen
+    /// from there share is computed once.
+    pub(crate) fn at(&self, receiver_ecef_m: &Vector3<f64>, time: GpsTime) -> ModelAt<'_> {
         let geodetic = Geodetic::from_ecef(receiver_ecef_m);
-        let look = geodetic.look(&line_of_sight.unit_ecef);
-        let ionosphere_m = self
-            .ionosphere
-            .map_or(0.0, |klobuchar| klobuchar.delay_m(&geodetic, &look, time));
-        let troposphere_m = if self.troposphere {
-            saastamoinen_delay_m(&geodetic, look.elevation_rad)
-        } else {
-            0.0
-        };
-        let errors = &self.errors;
-        Predicted {
-            pseudorange_m: line_of_sight.range_m - SPEED_OF_LIGHT_MPS * state.clock_bias_s
-                + ionosphere_m
-                + troposphere_m,
-            delay_variance_m2: (errors.ionosphere_fraction * ionosphere_m).powi(2)
-                + errors.troposphere_variance_m2(troposphere_m, look.elevation_rad),
-            line_of_sight,
-            look,
+        ModelAt {
+            model: self,
+            receiver_ecef_m: *receiver_ecef_m,
+            time,
+            geodetic,
+            enu_from_ecef: geodetic.enu_from_ecef(),
         }
     }
 
@@ -251,6 +246,43 @@ impl MeasurementModel {
             troposphere: false,
             elevation_mask_rad: -std::f64::consts::FRAC_PI_2,
             errors: ErrorModel::TRACKING_NOISE_ONLY,
+        }
+    }
+}
+
+/// A measurement model at one place and time.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct ModelAt<'a> {
+    model: &'a MeasurementModel,
+    receiver_ecef_m: Vector3<f64>,
+    time: GpsTime,
+    geodetic: Geodetic,
+    enu_from_ecef: Matrix3<f64>,
+}
+
+impl ModelAt<'_> {
+    /// As [`MeasurementModel::predict`].
+    pub(crate) fn predict(&self, state: &SatelliteState) -> Predicted {
+        let line_of_sight = LineOfSight::new(state, &self.receiver_ecef_m);
+        let look = Look::towards(&(self.enu_from_ecef * line_of_sight.unit_ecef));
+        let ionosphere_m = self.model.ionosphere.map_or(0.0, |klobuchar| {
+            klobuchar.delay_m(&self.geodetic, &look, self.time)
+        });
+        let troposphere_m = if self.model.troposphere {
+            saastamoinen_delay_m(&self.geodetic, look.elevation_rad)
+        } else {
+            0.0
+        };
+        let errors = &self.model.errors;
+        let delay_m = ionosphere_m + troposphere_m;
+        Predicted {
+            pseudorange_m: line_of_sight.range_m - SPEED_OF_LIGHT_MPS * state.clock_bias_s
+                + delay_m,
+            delay_m,
+            delay_variance_m2: (errors.ionosphere_fraction * ionosphere_m).powi(2)
+                + errors.troposphere_variance_m2(troposphere_m, look.elevation_rad),
+            line_of_sight,
+            look,
         }
     }
 }

@@ -2,10 +2,14 @@
 
 use nalgebra::Vector3;
 
-use crate::constants::{L1_WAVELENGTH_M, SPEED_OF_LIGHT_MPS};
-use crate::geodesy::{Geodetic, Look};
+use crate::constants::{CA_CODE_RATE_HZ, L1_WAVELENGTH_M, SPEED_OF_LIGHT_MPS};
+use crate::geodesy::Look;
 use crate::line_of_sight::LineOfSight;
+use crate::measurement::MeasurementModel;
 use crate::{Ephemeris, GpsTime, NavError, SatelliteState};
+
+/// Period of the C/A code, s.
+const CA_PERIOD_S: f64 = 1e-3;
 
 /// Where a receiver is, how it moves, and what its oscillator does.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -29,7 +33,9 @@ pub struct Expected {
     pub range_rate_mps: f64,
     /// Doppler of L1, Hz.
     pub doppler_hz: f64,
-    /// Reading of the satellite's clock in what arrives (atmosphere neglected): its whole
+    /// Delay of the code by ionosphere and troposphere, m; zero from [`predict`].
+    pub delay_m: f64,
+    /// Reading of the satellite's clock in what arrives, `delay_m` included: its whole
     /// milliseconds, bits and seconds are the boundaries of codes, bits and subframes.
     pub transmit_time: GpsTime,
     /// Where the satellite stands in the sky.
@@ -38,23 +44,58 @@ pub struct Expected {
     pub state: SatelliteState,
 }
 
-/// What a receiver expects of the satellite of `ephemeris`.
+impl Expected {
+    /// Code phase of L1 C/A in what arrives, chips, in [0, 1023) (equation (4) of Jiang2017).
+    #[must_use]
+    pub fn code_phase_chips(&self) -> f64 {
+        let chips = self.transmit_time.fraction_s() % CA_PERIOD_S * CA_CODE_RATE_HZ;
+        // The remainder is below one period; times the rate it may round up to all of it.
+        chips.min((CA_PERIOD_S * CA_CODE_RATE_HZ).next_down())
+    }
+
+    /// Rate at which the code phase grows, chips/s: 1.023e6 (1 - range rate / c), equation (4) of
+    /// Jiang2017 with its signs put right.
+    #[must_use]
+    pub fn code_rate_hz(&self) -> f64 {
+        CA_CODE_RATE_HZ * (1.0 - self.range_rate_mps / SPEED_OF_LIGHT_MPS)
+    }
+}
+
+/// What a receiver expects of the satellite of `ephemeris` through empty space.
 ///
 /// # Errors
 /// As [`Ephemeris::state_at`], and for a receiver whose position is not finite.
 pub fn predict(ephemeris: &Ephemeris, receiver: &ReceiverState) -> Result<Expected, NavError> {
+    predict_through(ephemeris, receiver, &MeasurementModel::geometry_only())
+}
+
+/// What a receiver expects of the satellite of `ephemeris` through the delays of `model`.
+///
+/// The delays hold back the code; that the satellite stands elsewhere by its range rate times the
+/// delay is left out (0.1 mm for 30 m). Their own rates are left out: millimetres a second, except the
+/// troposphere of low satellites, 8 mm/s at 10 degrees and 3 cm/s at 5 as they rise or set.
+///
+/// # Errors
+/// As [`predict`].
+pub fn predict_through(
+    ephemeris: &Ephemeris,
+    receiver: &ReceiverState,
+    model: &MeasurementModel,
+) -> Result<Expected, NavError> {
     let (state, line_of_sight) =
         received_state(ephemeris, &receiver.position_ecef_m, receiver.time)?;
+    let predicted = model.predict(&state, &receiver.position_ecef_m, receiver.time);
     let range_rate_mps = line_of_sight.range_rate_mps(&receiver.velocity_ecef_mps)
         + receiver.clock_drift_mps
         - SPEED_OF_LIGHT_MPS * state.clock_drift;
-    let sent = receiver.time - line_of_sight.range_m / SPEED_OF_LIGHT_MPS;
+    let travel_m = line_of_sight.range_m + predicted.delay_m;
     Ok(Expected {
         range_m: line_of_sight.range_m,
         range_rate_mps,
         doppler_hz: -range_rate_mps / L1_WAVELENGTH_M,
-        transmit_time: sent + state.clock_bias_s,
-        look: Geodetic::from_ecef(&receiver.position_ecef_m).look(&line_of_sight.unit_ecef),
+        delay_m: predicted.delay_m,
+        transmit_time: receiver.time - travel_m / SPEED_OF_LIGHT_MPS + state.clock_bias_s,
+        look: predicted.look,
         state,
     })
 }
@@ -81,4 +122,82 @@ pub(crate) fn received_state(
         path = LineOfSight::new(&state, receiver_ecef_m);
     }
     Ok((state, path))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Klobuchar;
+    use crate::made_up_sky::{constellation, receiver};
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+
+    fn through_air() -> MeasurementModel {
+        MeasurementModel {
+            ionosphere: Some(Klobuchar {
+                alpha: [1.77e-8, -7.451e-9, -5.96e-8, 1.192e-7],
+                beta: [131_100.0, -131_100.0, 65_540.0, -262_100.0],
+            }),
+            troposphere: true,
+            ..MeasurementModel::default()
+        }
+    }
+
+    /// What is expected of every satellite above 10 degrees when the receiver's clock has gone on
+    /// by `later_s`.
+    fn expected(later_s: f64, model: &MeasurementModel) -> Vec<Expected> {
+        let state = receiver();
+        let clock = state.receiver_clock() + later_s;
+        constellation(&mut ChaCha8Rng::seed_from_u64(1))
+            .iter()
+            .map(|ephemeris| state.expect(ephemeris, clock, model).unwrap())
+            .filter(|e| e.look.elevation_rad > 10f64.to_radians())
+            .collect()
+    }
+
+    #[test]
+    fn code_and_carrier_run_at_the_predicted_rates() {
+        let model = MeasurementModel::geometry_only();
+        let (before, now, after) = (
+            expected(-0.5, &model),
+            expected(0.0, &model),
+            expected(0.5, &model),
+        );
+        assert!(now.len() >= 6);
+        for ((b, n), a) in before.iter().zip(&now).zip(&after) {
+            // Transmit time that passes in a second of the receiver's clock, 1 - range rate / c.
+            let per_second = a.transmit_time - b.transmit_time;
+            let code_hz = CA_CODE_RATE_HZ * per_second;
+            // The product of range rate and drift, 0.2 mm/s here, and 1e-16 s of a time.
+            let allowed_mps = 1e-3;
+            let allowed_hz = CA_CODE_RATE_HZ * allowed_mps / SPEED_OF_LIGHT_MPS;
+            assert!((code_hz - n.code_rate_hz()).abs() < allowed_hz);
+            let doppler_hz = (per_second - 1.0) * crate::constants::L1_HZ;
+            assert!((doppler_hz - n.doppler_hz).abs() < allowed_mps / L1_WAVELENGTH_M);
+        }
+    }
+
+    #[test]
+    fn the_code_phase_is_that_of_the_transmit_time() {
+        for one in expected(0.0, &through_air()) {
+            let chips = one.code_phase_chips();
+            assert!((0.0..1023.0).contains(&chips));
+            let periods = one.transmit_time.fraction_s() * 1e3 - chips / 1023.0;
+            // 1e3 periods of a second round to 1e-13.
+            assert!((periods - periods.round()).abs() < 1e-9, "{periods}");
+        }
+    }
+
+    #[test]
+    fn the_air_holds_back_the_code_and_nothing_else() {
+        let empty = expected(0.0, &MeasurementModel::geometry_only());
+        for (air, none) in expected(0.0, &through_air()).iter().zip(&empty) {
+            assert!((2.0..60.0).contains(&air.delay_m), "{}", air.delay_m);
+            assert_eq!(none.delay_m, 0.0);
+            let later_s = none.transmit_time - air.transmit_time;
+            // A time of the fraction of a second rounds to 1e-16 s.
+            assert!((later_s * SPEED_OF_LIGHT_MPS - air.delay_m).abs() < 1e-6);
+            assert_eq!(air.doppler_hz, none.doppler_hz);
+        }
+    }
 }

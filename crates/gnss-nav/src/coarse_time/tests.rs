@@ -5,6 +5,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::*;
 use crate::geodesy::Geodetic;
+use crate::made_up_sky::{constellation, normal, reference_time};
 use crate::measurement::ErrorModel;
 use crate::prediction::{ReceiverState, predict};
 
@@ -13,50 +14,7 @@ const CODE_SIGMA_M: f64 = 10.0;
 const DOPPLER_SIGMA_HZ: f64 = 5.0;
 
 fn truth_time() -> GpsTime {
-    GpsTime::new(2190, 540_000.123_456_7)
-}
-
-/// 30 satellites in six planes, with the eccentricities and harmonics of real ones.
-fn constellation(rng: &mut ChaCha8Rng) -> EphemerisStore {
-    let reference = GpsTime::new(2190, 540_000.0);
-    (0..30u8)
-        .map(|k| Ephemeris {
-            satellite: SatelliteId::gps(k + 1),
-            iodc: 1,
-            iode: 1,
-            health: 0,
-            ura_index: 0,
-            codes_on_l2: 0,
-            l2_p_data_off: false,
-            fit_interval_extended: false,
-            toc: reference,
-            af0_s: rng.random_range(-5e-4..5e-4),
-            af1: rng.random_range(-1e-11..1e-11),
-            af2_per_s: 0.0,
-            tgd_s: 5e-9,
-            toe: reference,
-            sqrt_a: 5153.6 + rng.random_range(-0.1..0.1),
-            eccentricity: rng.random_range(0.0..0.02),
-            m0_rad: f64::from(k / 6) * 1.26 + f64::from(k % 6) * 0.4 - f64::from(k),
-            delta_n_rad_s: 4.5e-9,
-            omega0_rad: f64::from(k % 6) * 1.047,
-            omega_dot_rad_s: -8e-9,
-            i0_rad: 0.96,
-            idot_rad_s: 1e-10,
-            omega_rad: f64::from(k),
-            cuc_rad: 1e-6,
-            cus_rad: 8e-6,
-            crc_m: 230.0,
-            crs_m: 20.0,
-            cic_rad: 1e-7,
-            cis_rad: -1e-7,
-        })
-        .collect()
-}
-
-fn normal(rng: &mut ChaCha8Rng) -> f64 {
-    // Sum of twelve uniform variables: variance 1, no tails, which no test here needs.
-    (0..12).map(|_| rng.random_range(-0.5..0.5)).sum()
+    reference_time() + 0.123_456_7
 }
 
 struct World {

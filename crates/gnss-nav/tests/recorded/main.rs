@@ -11,6 +11,7 @@
 )]
 
 mod data;
+mod filters;
 mod orbits;
 mod positions;
 mod rinex;

@@ -9,16 +9,16 @@ use nalgebra::Vector3;
 use crate::data::{number, rows, text};
 use crate::rinex::{self, Navigation};
 
-struct Recording {
-    folder: &'static str,
-    nav: &'static str,
-    truth_ecef_m: [f64; 3],
+pub(crate) struct Recording {
+    pub(crate) folder: &'static str,
+    pub(crate) nav: &'static str,
+    pub(crate) truth_ecef_m: [f64; 3],
     /// Horizontal and vertical rms error allowed, m.
-    allowed_m: [f64; 2],
+    pub(crate) allowed_m: [f64; 2],
 }
 
 /// RTKLIB's errors (data README) with 20 % for the different weighting.
-const RECORDINGS: [Recording; 2] = [
+pub(crate) const RECORDINGS: [Recording; 2] = [
     Recording {
         folder: "rinex/01_sept078m_1hz",
         nav: "SEPT078M.21P",
@@ -37,27 +37,45 @@ const RECORDINGS: [Recording; 2] = [
     },
 ];
 
+/// Four genuine outliers of a receiver (152 m to 6.8 km) among 931 epochs of five to nine
+/// satellites; allowed are the errors of RTKLIB without them.
+pub(crate) const OUTLIERS: Recording = Recording {
+    folder: "rinex/11_f9p_spirent_15min_1hz",
+    nav: "f9p.nav",
+    truth_ecef_m: [
+        -481_819.313_497_24,
+        5_507_219.953_754_01,
+        3_170_373.735_383_64,
+    ],
+    allowed_m: [0.40 * 1.2, 0.67 * 1.2],
+};
+
+impl Recording {
+    /// Ephemerides, and the pseudoranges with what RTKLIB made of them.
+    pub(crate) fn read(&self) -> Option<(Navigation, String)> {
+        let navigation = text(&format!("{}/{}", self.folder, self.nav))?;
+        let reference = text(&format!("{}/truth_residuals_gps.csv.gz", self.folder))?;
+        Some((rinex::read(&navigation), reference))
+    }
+}
+
 #[test]
 fn fixes_are_as_good_as_those_of_rtklib() {
     for recording in &RECORDINGS {
-        let (Some(nav), Some(reference)) = (
-            text(&format!("{}/{}", recording.folder, recording.nav)),
-            text(&format!("{}/truth_residuals_gps.csv.gz", recording.folder)),
-        ) else {
+        let Some((navigation, reference)) = recording.read() else {
             return;
         };
-        let navigation = rinex::read(&nav);
         let all: Vec<Vec<&str>> = rows(&reference, 1).collect();
         check_delays(recording, &navigation, &all);
         check_fixes(recording, &navigation, &all);
     }
 }
 
-fn time(row: &[&str]) -> GpsTime {
+pub(crate) fn time(row: &[&str]) -> GpsTime {
     GpsTime::new(number(row, 0) as i32, number(row, 1))
 }
 
-fn raw(row: &[&str]) -> RawMeasurement {
+pub(crate) fn raw(row: &[&str]) -> RawMeasurement {
     let pseudorange_m = number(row, 5);
     RawMeasurement {
         satellite: row[2].parse().unwrap(),
@@ -70,7 +88,7 @@ fn raw(row: &[&str]) -> RawMeasurement {
     }
 }
 
-fn model(navigation: &Navigation) -> MeasurementModel {
+pub(crate) fn model(navigation: &Navigation) -> MeasurementModel {
     MeasurementModel {
         ionosphere: navigation.klobuchar,
         troposphere: true,
@@ -143,27 +161,16 @@ fn check_fixes(recording: &Recording, navigation: &Navigation, all: &[Vec<&str>]
     );
 }
 
-/// Four genuine outliers of a receiver (152 m to 6.8 km) among 931 epochs of five to nine
-/// satellites.
 #[test]
 fn genuine_outliers_are_excluded() {
-    let folder = "rinex/11_f9p_spirent_15min_1hz";
-    let (Some(nav), Some(reference)) = (
-        text(&format!("{folder}/f9p.nav")),
-        text(&format!("{folder}/truth_residuals_gps.csv.gz")),
-    ) else {
+    let Some((navigation, reference)) = OUTLIERS.read() else {
         return;
     };
-    let navigation = rinex::read(&nav);
     let model = MeasurementModel {
         elevation_mask_rad: 5f64.to_radians(),
         ..model(&navigation)
     };
-    let truth = Vector3::new(
-        -481_819.313_497_24,
-        5_507_219.953_754_01,
-        3_170_373.735_383_64,
-    );
+    let truth = Vector3::from(OUTLIERS.truth_ecef_m);
     let (mut outliers, mut excluded, mut alarms, mut worst_m) = (0, 0, 0, 0.0f64);
     let all: Vec<Vec<&str>> = rows(&reference, 1).collect();
     for epoch in all.chunk_by(|a, b| a[1] == b[1]) {
