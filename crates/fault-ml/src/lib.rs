@@ -46,11 +46,18 @@
 #![cfg_attr(doctest, doc = include_str!("../README.md"))]
 
 mod channel;
+pub mod classical;
 mod error;
+#[cfg(test)]
+mod golden;
 mod integrity;
 mod judgement;
+pub mod particle;
+mod sight;
+mod window;
 
 pub use channel::{Cadence, ChannelMonitor, ChannelVerdict, Innovation};
 pub use error::MonitorError;
 pub use integrity::{IntegrityMonitor, IntegrityReport, SatelliteMeasurement};
 pub use judgement::{Health, Judgement};
+pub use sight::{STATES, Sight, check_sights};
