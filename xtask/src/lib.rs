@@ -4,5 +4,6 @@ pub mod ci;
 pub mod code_noise;
 pub mod constellation;
 pub mod demo;
+pub mod reproduce;
 pub mod synthesis;
 pub mod tidy;

@@ -1,6 +1,7 @@
 //! Command line of the project tasks.
 
 use std::io::{self, Write};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::Result;
@@ -8,6 +9,7 @@ use clap::{Parser, Subcommand};
 use xtask::ci::ci;
 use xtask::code_noise::{self, Experiment};
 use xtask::demo::demo;
+use xtask::reproduce::{Paper, reproduce};
 use xtask::tidy::{Severity, tidy, workspace_root};
 
 #[derive(Debug, Parser)]
@@ -46,6 +48,15 @@ enum Task {
         /// Code loop bandwidth, Hz [default: the receiver's]
         #[arg(long, value_name = "HZ")]
         code_bandwidth: Option<f64>,
+    },
+    /// Repeat the experiments of a paper: summary.json, report.md and pictures.
+    Reproduce {
+        /// Which paper.
+        #[arg(value_enum)]
+        paper: Paper,
+        /// Folder that receives a folder of the paper's name.
+        #[arg(long, value_name = "DIR", default_value = "reproduced")]
+        out: PathBuf,
     },
     /// Check the layers, module comments and what no compiler checks.
     Tidy,
@@ -100,6 +111,11 @@ fn perform(task: Task) -> Result<ExitCode> {
             }
             writeln!(out, "{}", code_noise::table(&experiment)?)?;
             Ok(ExitCode::SUCCESS)
+        }
+        Task::Reproduce { paper, out: folder } => {
+            let outcome = reproduce(paper, &folder)?;
+            writeln!(out, "{outcome}")?;
+            Ok(verdict(outcome.holds()))
         }
         Task::Tidy => {
             let findings = tidy(&workspace_root())?;

@@ -52,12 +52,19 @@ mod error;
 mod golden;
 mod integrity;
 mod judgement;
+mod linearise;
+mod noise_model;
 pub mod particle;
 mod sight;
+#[cfg(test)]
+mod test_sky;
 mod window;
 
 pub use channel::{Cadence, ChannelMonitor, ChannelVerdict, Innovation};
 pub use error::MonitorError;
 pub use integrity::{IntegrityMonitor, IntegrityReport, SatelliteMeasurement};
 pub use judgement::{Health, Judgement};
+pub use linearise::Reference;
+pub use noise_model::{CorrelatedNoise, NoiseGenerator};
 pub use sight::{STATES, Sight, check_sights};
+pub use window::CumulativeRatio;

@@ -1,8 +1,9 @@
 //! Sums of log-likelihood ratios over every window that ends now.
 
-/// Increments of the last epochs, and the largest sum of those that end with the newest.
+/// Increments of the last epochs, and the largest sum of those that end with the newest:
+/// S(k) = max over k - U < j <= k of s(j) + ... + s(k), Wang2016 (11) and (12).
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct CumulativeRatio {
+pub struct CumulativeRatio {
     /// Newest last; a ring once full.
     increments: Vec<f64>,
     longest: usize,
@@ -11,7 +12,8 @@ pub(crate) struct CumulativeRatio {
 
 impl CumulativeRatio {
     /// Nothing seen yet; windows reach back `longest` epochs at most, at least one.
-    pub(crate) fn new(longest: usize) -> Self {
+    #[must_use]
+    pub fn new(longest: usize) -> Self {
         let longest = longest.max(1);
         Self {
             increments: Vec::with_capacity(longest),
@@ -21,7 +23,7 @@ impl CumulativeRatio {
     }
 
     /// Takes the increment of the next epoch.
-    pub(crate) fn push(&mut self, increment: f64) {
+    pub fn push(&mut self, increment: f64) {
         if self.increments.len() < self.longest {
             self.newest = self.increments.len();
             self.increments.push(increment);
@@ -32,7 +34,8 @@ impl CumulativeRatio {
     }
 
     /// max over j of the sum from j to now, of the last `longest` epochs; minus infinity at first.
-    pub(crate) fn largest(&self) -> f64 {
+    #[must_use]
+    pub fn largest(&self) -> f64 {
         let (older, newer) = self
             .increments
             .split_at((self.newest + 1).min(self.increments.len()));
@@ -46,7 +49,7 @@ impl CumulativeRatio {
     }
 
     /// Forgets everything.
-    pub(crate) fn clear(&mut self) {
+    pub fn clear(&mut self) {
         self.increments.clear();
         self.newest = 0;
     }

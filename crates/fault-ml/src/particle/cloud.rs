@@ -115,19 +115,22 @@ impl Cloud {
         self.weight.fill(step);
     }
 
-    /// Multiplies the weights by exp(`log_factor`) and normalises them.
+    /// Multiplies the weights by exp(`log_factor`) and normalises them; returns the logarithm of
+    /// their sum before that, ln sum w exp(log factor).
     ///
     /// The largest factor is taken out first, so that one weight is always above zero.
-    pub(super) fn reweigh(&mut self, log_factor: &[f64]) {
+    pub(super) fn reweigh(&mut self, log_factor: &[f64]) -> f64 {
         let largest = largest_likely(&self.weight, log_factor);
         let mut sum = 0.0;
         for (weight, log) in self.weight.iter_mut().zip(log_factor) {
             *weight *= (log - largest).exp();
             sum += *weight;
         }
+        let scale = 1.0 / sum;
         for weight in &mut self.weight {
-            *weight /= sum;
+            *weight *= scale;
         }
+        sum.ln() + largest
     }
 }
 
@@ -135,7 +138,11 @@ impl Cloud {
 pub(super) fn largest_likely(weight: &[f64], log: &[f64]) -> f64 {
     let pairs = weight.iter().zip(log);
     pairs.fold(f64::NEG_INFINITY, |largest, (w, l)| {
-        if *w > 0.0 { largest.max(*l) } else { largest }
+        if *w > 0.0 && *l > largest {
+            *l
+        } else {
+            largest
+        }
     })
 }
 
@@ -174,7 +181,8 @@ mod tests {
     #[test]
     fn hopeless_weights_still_sum_to_one() {
         let mut cloud = cloud(&[1.0, 2.0], &[0.5, 0.5]);
-        cloud.reweigh(&[-1e6, -1e6 - 1.0]);
+        let sum = cloud.reweigh(&[-1e6, -1e6 - 1.0]);
+        assert!((sum + 1e6 - (0.5 + 0.5 * (-1.0f64).exp()).ln()).abs() < 1e-9);
         let expected = 1.0 / (1.0 + (-1.0f64).exp());
         assert!((cloud.weight[0] - expected).abs() < 1e-15);
         assert!((log_weighted_sum(&[0.5, 0.5], &[-1e6, -1e6]) + 1e6).abs() < 1e-9);

@@ -4,6 +4,7 @@ use std::f64::consts::PI;
 
 use super::cloud::{Cloud, log_weighted_sum};
 use super::likelihood::Likelihood;
+use super::quadratic::Quadratic;
 use crate::{STATES, Sight};
 
 /// Log likelihoods of one epoch at every particle of one cloud.
@@ -110,6 +111,12 @@ impl Evidence {
                 *total += *term;
             }
         }
+    }
+
+    /// As [`fill`](Self::fill) under normal noise, by one quadratic form of the state instead of
+    /// satellite after satellite; leaves nothing to take single satellites out of.
+    pub(super) fn fill_quadratic(&mut self, state: &[Vec<f64>; STATES], form: &Quadratic) {
+        form.evaluate(state, &mut self.total);
     }
 
     /// ln p of all but satellite `s`, after [`fill`](Self::fill) with all of them.
@@ -276,6 +283,17 @@ mod tests {
             1.0 / (information + 1.0 / 6.0),
             epsilon = 1e-12
         );
+    }
+
+    #[test]
+    fn the_quadratic_form_is_the_sum_over_satellites() {
+        let (cloud, sights) = (cloud(), sights());
+        let mut evidence = Evidence::new(1);
+        evidence.fill(&cloud.state, &sights, None, &Likelihood::Gaussian);
+        let plain = evidence.log_mean(&cloud);
+        evidence.fill_quadratic(&cloud.state, &Quadratic::log_likelihood(sights.iter()));
+        // A dozen roundings of numbers of about ten.
+        assert_relative_eq!(evidence.log_mean(&cloud), plain, epsilon = 1e-12);
     }
 
     #[test]

@@ -23,7 +23,7 @@ pub(super) struct Epoch<'a> {
 }
 
 impl<'a> Epoch<'a> {
-    fn used(&self) -> impl Iterator<Item = &'a Sight> + use<'a> {
+    fn used(&self) -> impl Iterator<Item = &'a Sight> + use<'a> + Clone {
         let left_out = self.left_out;
         let sights = self.sights.iter().enumerate();
         sights.filter_map(move |(s, sight)| (Some(s) != left_out).then_some(sight))
@@ -48,7 +48,7 @@ pub(super) struct Filter {
     /// Of the marginalised clock about each particle's mean, m^2.
     clock_variance_m2: f64,
     evidence: Evidence,
-    swarm: Option<Box<Swarm>>,
+    swarm: Swarm,
     /// Of corrected proposals: ln prior, and the whole logarithm of the weight, by particle.
     log_prior: Vec<f64>,
     correction: Vec<f64>,
@@ -61,8 +61,8 @@ impl Filter {
         let mut cloud = Cloud::new(particles);
         cloud.diffuse(&parameters.initial_sigma_m(), random);
         let swarm = match parameters.get().movement {
-            Movement::Bootstrap => None,
-            Movement::Swarm(_) => Some(Box::new(Swarm::new(particles))),
+            Movement::Bootstrap => Swarm::new(0),
+            Movement::Swarm(_) => Swarm::new(particles),
         };
         Self {
             cloud,
@@ -126,38 +126,44 @@ impl Filter {
             _ => None,
         };
         self.cloud.diffuse(&process_sigma_m, random);
-        let log_evidence = match settings.clock {
+        match settings.clock {
             ClockState::Sampled => self.weigh(epoch, &settings.likelihood, log_without),
             ClockState::Marginalised => {
                 let clock_noise_m2 = settings.clock_noise_m.powi(2) * epoch.elapsed_s;
-                self.weigh_marginal(epoch, clock_noise_m2, log_without)
+                self.weigh_marginal(epoch, clock_noise_m2, log_without);
             }
-        };
-        match (settings.movement, prior) {
+        }
+        let log_evidence = match (settings.movement, prior) {
             (Movement::Swarm(swarm), None) => self.fly(epoch, &settings.likelihood, &swarm, random),
             (Movement::Swarm(swarm), Some(prior)) => {
-                self.propose(epoch, &settings.likelihood, &swarm, &prior, random);
+                self.propose(epoch, &settings.likelihood, &swarm, &prior, random)
             }
             (Movement::Bootstrap, _) => self.cloud.reweigh(self.evidence.total()),
-        }
+        };
         self.conclude(log_evidence, settings.resample_below, random)
     }
 
-    /// Likelihoods at the predicted particles; returns ln p(y).
-    fn weigh(
-        &mut self,
-        epoch: Epoch,
-        likelihood: &Likelihood,
-        log_without: Option<&mut Vec<f64>>,
-    ) -> f64 {
+    /// Likelihoods at the predicted particles.
+    fn weigh(&mut self, epoch: Epoch, likelihood: &Likelihood, log_without: Option<&mut Vec<f64>>) {
+        let Some(log_without) = log_without else {
+            self.weigh_together(epoch, likelihood);
+            return;
+        };
         let (state, evidence) = (&self.cloud.state, &mut self.evidence);
         evidence.fill(state, epoch.sights, epoch.left_out, likelihood);
-        if let Some(log_without) = log_without {
-            log_without.clear();
-            let satellites = 0..epoch.sights.len();
-            log_without.extend(satellites.map(|s| evidence.log_mean_without(&self.cloud, s)));
+        log_without.clear();
+        let satellites = 0..epoch.sights.len();
+        log_without.extend(satellites.map(|s| evidence.log_mean_without(&self.cloud, s)));
+    }
+
+    /// Likelihoods at the particles where no single satellite is asked for.
+    fn weigh_together(&mut self, epoch: Epoch, likelihood: &Likelihood) {
+        let (state, evidence) = (&self.cloud.state, &mut self.evidence);
+        if *likelihood == Likelihood::Gaussian {
+            evidence.fill_quadratic(state, &Quadratic::log_likelihood(epoch.used()));
+        } else {
+            evidence.fill(state, epoch.sights, epoch.left_out, likelihood);
         }
-        evidence.log_mean(&self.cloud)
     }
 
     /// The same with the clock integrated out, whose posterior then replaces its prior.
@@ -166,7 +172,7 @@ impl Filter {
         epoch: Epoch,
         clock_noise_m2: f64,
         log_without: Option<&mut Vec<f64>>,
-    ) -> f64 {
+    ) {
         let evidence = &mut self.evidence;
         let variance_m2 = self.clock_variance_m2 + clock_noise_m2;
         let clock = evidence.fill_marginal(&self.cloud, epoch.sights, epoch.left_out, variance_m2);
@@ -180,31 +186,32 @@ impl Filter {
                     .map(|(s, sight)| evidence.log_marginal_without(&self.cloud, &clock, s, sight)),
             );
         }
-        let log_evidence = evidence.log_mean(&self.cloud);
         self.clock_variance_m2 = evidence.update_clock(&mut self.cloud, &clock);
-        log_evidence
     }
 
-    /// The swarm of Wang2016, in either order of weighting and moving.
+    /// The swarm of Wang2016, in either order of weighting and moving; returns ln p(y) by the
+    /// particles before the move.
     fn fly(
         &mut self,
         epoch: Epoch,
         likelihood: &Likelihood,
         settings: &SwarmSettings,
         random: &mut impl Rng,
-    ) {
+    ) -> f64 {
         if settings.order == SwarmOrder::WeighThenMove {
-            self.cloud.reweigh(self.evidence.total());
+            let log_evidence = self.cloud.reweigh(self.evidence.total());
+            self.swarm_to(epoch, likelihood, settings, None, random);
+            return log_evidence;
         }
+        let log_evidence = self.evidence.log_mean(&self.cloud);
         self.swarm_to(epoch, likelihood, settings, None, random);
-        if settings.order == SwarmOrder::MoveThenWeigh {
-            let (state, evidence) = (&self.cloud.state, &mut self.evidence);
-            evidence.fill(state, epoch.sights, epoch.left_out, likelihood);
-            self.cloud.reweigh(evidence.total());
-        }
+        self.weigh_together(epoch, likelihood);
+        self.cloud.reweigh(self.evidence.total());
+        log_evidence
     }
 
-    /// The swarm as a proposal, with weights corrected for it.
+    /// The swarm as a proposal, with weights corrected for it; returns ln p(y) by the particles
+    /// before the move.
     fn propose(
         &mut self,
         epoch: Epoch,
@@ -212,22 +219,23 @@ impl Filter {
         settings: &SwarmSettings,
         prior: &Prior,
         random: &mut impl Rng,
-    ) {
-        let Some(mode) = self.swarm_to(epoch, likelihood, settings, Some(prior), random) else {
-            return;
-        };
+    ) -> f64 {
+        let log_evidence = self.evidence.log_mean(&self.cloud);
+        let mode = self.swarm_to(epoch, likelihood, settings, Some(prior), random);
         let target = (epoch.used(), likelihood);
         let correction = &mut self.correction;
         if draw_about(&mut self.cloud, &mode, prior, target, random, correction) {
-            let (state, evidence) = (&self.cloud.state, &mut self.evidence);
-            evidence.fill(state, epoch.sights, epoch.left_out, likelihood);
-            prior.quadratic().evaluate(state, &mut self.log_prior);
-            let target = evidence.total().iter().zip(&self.log_prior);
-            for (sum, (log, log_prior)) in correction.iter_mut().zip(target) {
+            self.weigh_together(epoch, likelihood);
+            prior
+                .quadratic()
+                .evaluate(&self.cloud.state, &mut self.log_prior);
+            let target = self.evidence.total().iter().zip(&self.log_prior);
+            for (sum, (log, log_prior)) in self.correction.iter_mut().zip(target) {
                 *sum += log + log_prior;
             }
-            self.cloud.reweigh(correction);
+            self.cloud.reweigh(&self.correction);
         }
+        log_evidence
     }
 
     /// Lets the swarm climb the likelihood, times the prior where given; returns where it leads.
@@ -238,8 +246,8 @@ impl Filter {
         settings: &SwarmSettings,
         prior: Option<&Prior>,
         random: &mut impl Rng,
-    ) -> Option<[f64; STATES]> {
-        let swarm = self.swarm.as_deref_mut()?;
+    ) -> [f64; STATES] {
+        let swarm = &mut self.swarm;
         let (state, evidence) = (&mut self.cloud.state, &mut self.evidence);
         let prior = prior.map(Prior::quadratic);
         let draw = |uniform: &mut [f64]| draw_uniform(random, uniform);
@@ -263,7 +271,7 @@ impl Filter {
             };
             swarm.run(state, settings, fitness, draw);
         }
-        Some(*swarm.leader())
+        *swarm.leader()
     }
 
     fn conclude(

@@ -23,20 +23,30 @@
 //! # Ok::<(), fault_ml::MonitorError>(())
 //! ```
 
+mod calibration;
 mod cloud;
 mod evidence;
 mod filter;
 #[cfg(test)]
+mod filter_tests;
+#[cfg(test)]
 mod golden_tests;
 mod likelihood;
+mod monitor;
+#[cfg(test)]
+mod monitor_tests;
 mod parameters;
 mod proposal;
 mod protection;
 mod quadratic;
 mod raim;
+#[cfg(test)]
+mod raim_tests;
 mod swarm;
 
+pub use calibration::Calibration;
 pub use likelihood::Likelihood;
+pub use monitor::ParticleMonitor;
 pub use parameters::{
     CheckedParticleParameters, ClockState, Movement, ParticleParameters, RatioForm, Response,
 };

@@ -115,6 +115,19 @@ impl ParticleParameters {
         }
     }
 
+    /// For a receiver at rest by [`ParticleMonitor`](crate::particle::ParticleMonitor): 200
+    /// particles, heavy tails, and a clock noise of 1.5 m that covers the error of the median
+    /// residual the monitor steers its reference by.
+    #[must_use]
+    pub fn receiver() -> Self {
+        Self {
+            particles: 200,
+            clock_noise_m: 1.5,
+            likelihood: Likelihood::HEAVY_TAILED,
+            ..Self::default()
+        }
+    }
+
     /// These parameters, if all are possible and go together.
     ///
     /// # Errors

@@ -1,5 +1,7 @@
 //! The Gaussian fitness of a whole epoch as one quadratic form of the state.
 
+use std::f64::consts::PI;
+
 use nalgebra::{Matrix4, Vector4};
 
 use crate::{STATES, Sight};
@@ -28,6 +30,14 @@ impl Quadratic {
             sum.constant -= 0.5 * information * sight.residual_m * sight.residual_m;
         }
         sum
+    }
+
+    /// ln prod N(y; h x, sigma^2) over `sights`: the fitness with the constants of the densities.
+    pub(super) fn log_likelihood<'a>(sights: impl Iterator<Item = &'a Sight> + Clone) -> Self {
+        let mut form = Self::fitness(sights.clone());
+        let log_peak = |sight: &Sight| (sight.sigma_m * (2.0 * PI).sqrt()).ln();
+        form.constant -= sights.map(log_peak).sum::<f64>();
+        form
     }
 
     /// Adds another form.

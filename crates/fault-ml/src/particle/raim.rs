@@ -36,7 +36,8 @@ pub enum Decision {
 pub struct RaimEpoch {
     /// By the ratio the parameters choose.
     pub decision: Decision,
-    /// Weighted mean of the main filter, m about the reference point.
+    /// Weighted mean of the main filter, m about the reference point; of the filter that has
+    /// become it where a satellite is set aside.
     pub estimate_m: [f64; STATES],
     /// Effective particles of the main filter.
     pub effective_main: f64,
@@ -146,6 +147,13 @@ impl ParticleRaim {
         self.ratios(form).fold(None, largest)
     }
 
+    /// Standard deviation of the main filter's particles in three dimensions, m.
+    #[must_use]
+    pub fn spread_m(&self) -> f64 {
+        let (_, covariance) = self.main.cloud().moments();
+        covariance.fixed_view::<3, 3>(0, 0).trace().sqrt()
+    }
+
     /// Moves the reference point: what was at x is at x + `offset_m` now.
     pub fn shift(&mut self, offset_m: &[f64; STATES]) {
         self.main.shift(offset_m);
@@ -188,8 +196,11 @@ impl ParticleRaim {
             excluded: None,
             readmitted: self.readmit(sights),
         };
-        if self.parameters.get().response == Response::Exclude {
-            report.excluded = self.exclude(&decision);
+        if self.parameters.get().response == Response::Exclude
+            && let Some(clean) = self.exclude(&decision)
+        {
+            report.excluded = Some(clean.id);
+            report.estimate_m = clean.outcome.estimate_m;
         }
         Ok(report)
     }
@@ -277,8 +288,8 @@ impl ParticleRaim {
     }
 
     /// Sets an alarmed satellite aside. Its own filter never saw it and becomes the main one; all
-    /// others did, and start again from there.
-    fn exclude(&mut self, decision: &Decision) -> Option<u32> {
+    /// others did, and start again from there. Returns the filter that took over.
+    fn exclude(&mut self, decision: &Decision) -> Option<Subfilter> {
         let Decision::Judged {
             score,
             worst: Some(id),
@@ -296,7 +307,7 @@ impl ParticleRaim {
             sub.restart(&self.main);
         }
         self.set_aside.push(SetAside { id, recovery: 0.0 });
-        Some(id)
+        Some(clean)
     }
 
     /// Holds every satellite set aside against the main filter, and takes the first back for which
