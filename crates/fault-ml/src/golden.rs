@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use serde_json::Value;
 
 /// The text of a reference file, or `None`, said aloud, where there are none.
+#[allow(clippy::print_stderr, reason = "a skip must not be silent")]
 pub(crate) fn text(name: &str) -> Option<String> {
     let data = std::env::var_os("GNSS_TEST_DATA").map_or_else(
         || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"),

@@ -1,6 +1,7 @@
 //! From pseudoranges in the earth-fixed frame to sights about a reference point.
 
 use crate::classical::LeastSquaresFit;
+use crate::error::within;
 use crate::{MonitorError, STATES, SatelliteMeasurement, Sight};
 
 /// Largest satellite coordinate or pseudorange, m: beyond every navigation satellite.
@@ -74,31 +75,23 @@ impl Reference {
 pub(crate) fn check_measurements(
     measurements: &[SatelliteMeasurement],
 ) -> Result<(), MonitorError> {
-    let refuse = |name, value, expected| {
-        Err(MonitorError::Value {
-            name,
-            value,
-            expected,
-        })
-    };
     for (index, measurement) in measurements.iter().enumerate() {
-        let numbers = measurement
-            .position_ecef_m
-            .iter()
-            .chain([&measurement.pseudorange_m]);
-        for number in numbers {
-            if !(number.abs() <= FARTHEST_M) {
-                return refuse(
-                    "satellite position or pseudorange (m)",
-                    *number,
-                    "at most 1e9",
-                );
-            }
+        let place = measurement.position_ecef_m.into_iter();
+        for number in place.chain([measurement.pseudorange_m]) {
+            let name = "satellite position or pseudorange (m)";
+            within(
+                name,
+                number,
+                (-FARTHEST_M, FARTHEST_M),
+                "at most 1e9 either way",
+            )?;
         }
-        let variance_m2 = measurement.variance_m2;
-        if !(variance_m2 >= 1e-6 && variance_m2 <= 1e12) {
-            return refuse("variance (m^2)", variance_m2, "1e-6 to 1e12");
-        }
+        within(
+            "variance (m^2)",
+            measurement.variance_m2,
+            (1e-6, 1e12),
+            "1e-6 to 1e12",
+        )?;
         if measurements[..index].iter().any(|m| m.id == measurement.id) {
             return Err(MonitorError::Repeated { id: measurement.id });
         }
@@ -114,9 +107,9 @@ mod tests {
     #[test]
     fn the_centre_of_the_earth_is_far_enough_to_start_from() {
         let found = Reference::solve(&measurements(9, |_| 0.0)).unwrap();
-        for d in 0..3 {
+        for (found, put) in found.position_ecef_m.iter().zip(PLACE_M) {
             // The last step is below 1e-4 m and convergence is quadratic; range rounding is 4e-9.
-            assert!((found.position_ecef_m[d] - PLACE_M[d]).abs() < 1e-6);
+            assert!((found - put).abs() < 1e-6);
         }
         assert!((found.clock_m - CLOCK_M).abs() < 1e-6);
         assert_eq!(Reference::solve(&measurements(3, |_| 0.0)), None);

@@ -1,6 +1,7 @@
 //! One epoch as every integrity monitor of this crate takes it: lines of sight and residuals.
 
 use crate::MonitorError;
+use crate::error::within;
 
 /// States estimated from a snapshot: three of position, then c times the clock bias, all in m.
 pub const STATES: usize = 4;
@@ -32,23 +33,22 @@ impl Sight {
 
     /// Refuses what no monitor can work with.
     fn check(&self) -> Result<(), MonitorError> {
-        let refuse = |name, value, expected| {
-            Err(MonitorError::Value {
-                name,
-                value,
-                expected,
-            })
-        };
-        if let Some(bad) = self.design.iter().find(|d| !(d.abs() <= 2.0)) {
-            return refuse("design row", *bad, "a unit vector and 1");
+        for design in self.design {
+            within("design row", design, (-2.0, 2.0), "a unit vector and 1")?;
         }
-        if !(self.residual_m.abs() <= LARGEST_RESIDUAL_M) {
-            return refuse("residual (m)", self.residual_m, "at most 1e9 either way");
-        }
-        if !(self.sigma_m >= 1e-3 && self.sigma_m <= 1e6) {
-            return refuse("standard deviation (m)", self.sigma_m, "0.001 to 1e6");
-        }
-        Ok(())
+        let limits = (-LARGEST_RESIDUAL_M, LARGEST_RESIDUAL_M);
+        within(
+            "residual (m)",
+            self.residual_m,
+            limits,
+            "at most 1e9 either way",
+        )?;
+        within(
+            "standard deviation (m)",
+            self.sigma_m,
+            (1e-3, 1e6),
+            "0.001 to 1e6",
+        )
     }
 }
 

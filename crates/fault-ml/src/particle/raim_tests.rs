@@ -144,7 +144,7 @@ fn satellites_rise_and_set_without_a_false_alarm() {
     for (k, noise) in noise(&TAILED, 200, 4).iter().enumerate() {
         let mut sights = sights(&designs, |id| noise[id as usize]);
         sights.rotate_left(k % 3);
-        sights.retain(|s| (k / 7 + s.id as usize) % 4 != 0);
+        sights.retain(|s| !(k / 7 + s.id as usize).is_multiple_of(4));
         let report = raim.epoch(k as f64, &sights).unwrap();
         assert_eq!(report.excluded, None, "at {k}");
         let ids: Vec<_> = raim.ratios(RatioForm::Sound).map(|(id, _)| id).collect();

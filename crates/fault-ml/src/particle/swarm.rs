@@ -123,11 +123,11 @@ impl Swarm {
     fn accelerate(&mut self, state: &mut [Vec<f64>; STATES], settings: &SwarmSettings) {
         let (inertia, attraction) = (settings.inertia, settings.attraction);
         let count = self.fitness.len();
-        for d in 0..STATES {
+        for (d, coordinates) in state.iter_mut().enumerate() {
             let (r1, r2) = self.uniform[2 * d * count..][..2 * count].split_at(count);
             let random = r1.iter().zip(r2);
             let own = self.velocity[d].iter_mut().zip(&self.best[d]);
-            for ((x, (v, best)), (r1, r2)) in state[d].iter_mut().zip(own).zip(random) {
+            for ((x, (v, best)), (r1, r2)) in coordinates.iter_mut().zip(own).zip(random) {
                 let pull = r1 * (best - *x) + r2 * (self.leader[d] - *x);
                 *v = inertia * *v + attraction * pull;
                 *x += *v;
