@@ -4,7 +4,9 @@
 //! of all satellites. Both state a score and the threshold it is held against: faulty is exactly
 //! a score above its threshold. What to do about it is for others to decide.
 //!
-//! This version holds the traits and the values that cross them; it has no monitor of its own yet.
+//! [`particle`] holds integrity monitoring by particle filters, [`classical`] the detectors it is
+//! measured against. Both take [`Sight`]s, lines of sight and residuals about a reference point, and
+//! know nothing of orbits or signals.
 //!
 //! ```
 //! use fault_ml::{Cadence, ChannelMonitor, ChannelVerdict, Innovation, Judgement, MonitorError};

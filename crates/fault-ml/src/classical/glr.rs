@@ -1,4 +1,4 @@
-//! Windowed generalised likelihood ratio for a step in one pseudorange.
+//! Windowed generalised likelihood ratio for a step in one pseudorange (`Willsky1976`).
 
 use std::collections::VecDeque;
 

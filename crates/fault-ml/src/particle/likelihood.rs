@@ -55,12 +55,12 @@ impl Likelihood {
                 let square = tail_scale * tail_scale;
                 let core_m = sigma_m / (1.0 - tail_share + tail_share * square).sqrt();
                 let peak = |share: f64, width_m: f64| share / (width_m * (2.0 * PI).sqrt());
-                ScaledLikelihood::Mixture {
+                ScaledLikelihood::Mixture(ScaledMixture {
                     half_core: 0.5 / (core_m * core_m),
                     half_tail: 0.5 / (core_m * core_m * square),
                     core_peak: peak(1.0 - tail_share, core_m),
                     tail_peak: peak(tail_share, core_m * tail_scale),
-                }
+                })
             }
             Self::Laplace => ScaledLikelihood::Laplace {
                 rate: SQRT_2 / sigma_m,
@@ -81,20 +81,38 @@ impl Likelihood {
 /// A [`Likelihood`] with its constants worked out for one standard deviation.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum ScaledLikelihood {
-    Gaussian {
-        information: f64,
-        log_peak: f64,
-    },
-    Mixture {
-        half_core: f64,
-        half_tail: f64,
-        core_peak: f64,
-        tail_peak: f64,
-    },
-    Laplace {
-        rate: f64,
-        log_peak: f64,
-    },
+    Gaussian { information: f64, log_peak: f64 },
+    Mixture(ScaledMixture),
+    Laplace { rate: f64, log_peak: f64 },
+}
+
+/// Both parts of a mixture: halved inverse variances (1/m^2) and densities at zero (1/m).
+#[derive(Debug, Clone, Copy)]
+pub(super) struct ScaledMixture {
+    half_core: f64,
+    half_tail: f64,
+    core_peak: f64,
+    tail_peak: f64,
+}
+
+impl ScaledMixture {
+    /// Density of the core at a squared residual, with the tail's exponential taken out as a
+    /// factor: never overflows.
+    #[inline]
+    fn core(&self, square_m2: f64) -> f64 {
+        self.core_peak * ((self.half_tail - self.half_core) * square_m2).exp()
+    }
+
+    #[inline]
+    fn log_density(&self, square_m2: f64) -> f64 {
+        (self.core(square_m2) + self.tail_peak).ln() - self.half_tail * square_m2
+    }
+
+    fn information(&self, square_m2: f64) -> f64 {
+        let core = self.core(square_m2);
+        let slope = core * self.half_core + self.tail_peak * self.half_tail;
+        2.0 * slope / (core + self.tail_peak)
+    }
 }
 
 impl ScaledLikelihood {
@@ -105,17 +123,7 @@ impl ScaledLikelihood {
                 information,
                 log_peak,
             } => log_peak - 0.5 * information * residual_m * residual_m,
-            Self::Mixture {
-                half_core,
-                half_tail,
-                core_peak,
-                tail_peak,
-            } => {
-                let square = residual_m * residual_m;
-                // The tail taken out as a factor: the core's share of it never overflows.
-                let core = core_peak * (-(half_core - half_tail) * square).exp();
-                (core + tail_peak).ln() - half_tail * square
-            }
+            Self::Mixture(mixture) => mixture.log_density(residual_m * residual_m),
             Self::Laplace { rate, log_peak } => log_peak - rate * residual_m.abs(),
         }
     }
@@ -125,16 +133,7 @@ impl ScaledLikelihood {
     pub(super) fn information(&self, residual_m: f64) -> f64 {
         match *self {
             Self::Gaussian { information, .. } => information,
-            Self::Mixture {
-                half_core,
-                half_tail,
-                core_peak,
-                tail_peak,
-            } => {
-                let square = residual_m * residual_m;
-                let core = core_peak * (-(half_core - half_tail) * square).exp();
-                2.0 * (core * half_core + tail_peak * half_tail) / (core + tail_peak)
-            }
+            Self::Mixture(mixture) => mixture.information(residual_m * residual_m),
             // Bounded where the density has its kink.
             Self::Laplace { rate, .. } => rate / residual_m.abs().max(1.0 / rate),
         }

@@ -1,4 +1,7 @@
 //! The swarm as an importance proposal: where it leads, drawn about, and weighted for that.
+//!
+//! With the prior a normal law of the last cloud's moments this is a Gaussian particle filter
+//! (`Kotecha2003`) whose proposal the swarm centres.
 
 use nalgebra::{Matrix4, Vector4};
 use rand::Rng;
