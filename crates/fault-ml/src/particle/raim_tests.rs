@@ -9,8 +9,8 @@ use crate::{MonitorError, Sight};
 
 const SWARM: Movement = Movement::Swarm(SwarmSettings {
     iterations: 10,
-    inertia: 0.5,
-    attraction: 1.0,
+    inertia: 0.6,
+    attraction: 1.2,
     order: SwarmOrder::WeighThenMove,
 });
 const ONSET: usize = 150;

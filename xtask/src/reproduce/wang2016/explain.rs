@@ -67,17 +67,16 @@ fn what_becomes_of_accuracy(study: &Study) -> Result<String> {
 
 fn what_correction_does(study: &Study) -> Result<String> {
     let corrected = case(&study.paper, "pso_corrected")?;
+    let delays = |case: &Case| three(Performance::new(&case.runs, 0, THRESHOLD).delay_median_s, 1);
     Ok(format!(
         "**The swarm as a proposal.** Weights cannot be put right after the move itself: the density of where a swarm ends is not known, and a normal \
          law fitted to the collapsed swarm is far too narrow. Where the swarm only finds the mode of likelihood x prior, and particles are drawn about it \
          with the curvature there and weighted by target over proposal, N_eff is {:.1} with an rms error of {:.2} m; the delays of the paper's ratio \
-         are then {} s: those of the plain filter, because so is the posterior. Its prior is a normal law of the last cloud's moments.",
+         are then {} s: those of the Kalman bank, {} s, whose posterior it should have. Its prior is a normal law of the last cloud's moments.",
         effective(&corrected.runs)[0],
         clean_rms_m(corrected),
-        three(
-            Performance::new(&corrected.runs, 0, THRESHOLD).delay_median_s,
-            1
-        ),
+        delays(corrected),
+        delays(case(&study.paper, "kalman_bank")?),
     ))
 }
 

@@ -13,6 +13,8 @@ pub mod report;
 pub mod setting;
 pub mod simulate;
 pub mod study;
+#[cfg(test)]
+mod tests;
 
 use anyhow::Result;
 
