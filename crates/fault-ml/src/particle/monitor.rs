@@ -22,7 +22,7 @@ const FEWEST_TO_START: usize = STATES + 1;
 /// reference follows the receiver's: every epoch the median residual, which one fault moves
 /// little, is taken off, so that any drift or jump common to all satellites is gone before a particle
 /// meets it. The process noise of the clock has to cover the error of that median, about
-/// 0.5 sigma for eight satellites.
+/// 0.5 sigma for eight satellites ([`ParticleParameters::receiver`](super::ParticleParameters)).
 #[derive(Debug, Clone)]
 pub struct ParticleMonitor {
     parameters: CheckedParticleParameters,

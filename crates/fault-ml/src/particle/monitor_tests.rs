@@ -8,10 +8,7 @@ use crate::test_sky::{PLACE_M, TAILED, measurements, noise};
 use crate::{Health, IntegrityMonitor, IntegrityReport, SatelliteMeasurement};
 
 fn monitor(movement: Movement) -> ParticleMonitor {
-    let parameters = ParticleParameters {
-        movement,
-        ..ParticleParameters::receiver()
-    };
+    let parameters = ParticleParameters::receiver(movement);
     ParticleMonitor::new(parameters.check().unwrap(), ChaCha8Rng::seed_from_u64(1))
 }
 

@@ -1,5 +1,6 @@
 //! The bank on simulated epochs: who is named when, set aside, taken back.
 
+use proptest::prelude::*;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
@@ -263,4 +264,45 @@ fn a_calibrated_threshold_has_the_stated_false_alarm_rate_under_correlated_noise
         threshold(0.4, 2) < stated && stated < threshold(0.05, 2),
         "{stated}"
     );
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    #[test]
+    fn no_sequence_of_usable_numbers_upsets_the_bank(
+        seed in 0u64..1000,
+        form in 0usize..5,
+        epochs in prop::collection::vec(
+            prop::collection::vec((0u32..12, -1.0..1.0f64, -1.0..1.0f64, -1e9..1e9f64, -3.0..6.0f64), 0..12),
+            1..12,
+        ),
+    ) {
+        let parameters = [
+            ParticleParameters { movement: SWARM, warm_up_epochs: 0, ..ParticleParameters::default() },
+            ParticleParameters { warm_up_epochs: 0, ..ParticleParameters::default() },
+            ParticleParameters { clock: ClockState::Marginalised, warm_up_epochs: 0, ..ParticleParameters::default() },
+            ParticleParameters { likelihood: Likelihood::HEAVY_TAILED, resample_below: 0.5, warm_up_epochs: 0, ..ParticleParameters::default() },
+            ParticleParameters {
+                movement: Movement::Swarm(SwarmSettings { order: SwarmOrder::Corrected, ..SwarmSettings::default() }),
+                likelihood: Likelihood::Laplace,
+                warm_up_epochs: 0,
+                ..ParticleParameters::default()
+            },
+        ][form];
+        let mut raim = bank(parameters, seed);
+        for (k, rows) in epochs.iter().enumerate() {
+            let mut sights: Vec<Sight> = rows.iter().map(|(id, a, b, residual_m, power)| Sight {
+                id: *id, design: [*a, *b, a * b, 1.0], residual_m: *residual_m, sigma_m: 10f64.powf(*power),
+            }).collect();
+            sights.sort_by_key(|s| s.id);
+            sights.dedup_by_key(|s| s.id);
+            let report = raim.epoch(k as f64, &sights).unwrap();
+            prop_assert!(report.estimate_m.iter().all(|x| x.is_finite()), "{:?}", report);
+            prop_assert!(report.effective_main.is_finite());
+            if let Decision::Judged { score, .. } = report.decision {
+                prop_assert!(!score.is_nan());
+            }
+        }
+    }
 }
