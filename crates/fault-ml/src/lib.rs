@@ -55,6 +55,7 @@ mod golden;
 mod integrity;
 mod judgement;
 mod linearise;
+mod noise_fit;
 mod noise_model;
 pub mod particle;
 mod sight;

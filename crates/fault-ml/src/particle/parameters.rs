@@ -122,7 +122,7 @@ impl ParticleParameters {
     /// reference by, half a deviation of a pseudorange: 10 m where the clock is integrated out and
     /// a wide prior costs nothing, 1.5 m where particles have to find it. The noise of receivers
     /// in the open is slow rather than heavy-tailed: with satellite biases of 2 m, a mixture
-    /// likelihood takes a step of 15 m for a tail and finds it in 4 s, a normal one in 1 s.
+    /// likelihood first takes a step of 15 m for a tail.
     #[must_use]
     pub fn receiver(movement: Movement) -> Self {
         let (clock, clock_noise_m) = match movement {
@@ -144,53 +144,41 @@ impl ParticleParameters {
     /// [`MonitorError::Value`] naming the first that is not possible,
     /// [`MonitorError::Combination`] where two exclude one another.
     pub fn check(self) -> Result<CheckedParticleParameters, MonitorError> {
-        let count =
-            |name, value: usize, limits, expected| within(name, value as f64, limits, expected);
-        count("particles", self.particles, (10.0, 1e4), "10 to 10000")?;
-        count(
-            "window (epochs)",
-            self.window_epochs,
-            (1.0, 1e3),
-            "1 to 1000",
-        )?;
-        count(
-            "warm-up (epochs)",
-            self.warm_up_epochs,
-            (0.0, 1e6),
-            "0 to 1000000",
-        )?;
-        let spread = (1e-3, 1e5);
-        within(
-            "initial deviation (m)",
-            self.initial_sigma_m,
-            spread,
-            "0.001 to 1e5",
-        )?;
-        within(
-            "position noise (m)",
-            self.position_noise_m,
-            spread,
-            "0.001 to 1e5",
-        )?;
-        within(
-            "clock noise (m)",
-            self.clock_noise_m,
-            spread,
-            "0.001 to 1e5",
-        )?;
-        within(
-            "resampling share",
-            self.resample_below,
-            (1e-3, 1.0),
-            "0.001 to 1",
-        )?;
-        within(
-            "fault width (m)",
-            self.fault_width_m,
-            (1.0, 1e6),
-            "1 to 1e6",
-        )?;
-        within("threshold", self.threshold, (1e-3, 1e6), "0.001 to 1e6")?;
+        let spread = ((1e-3, 1e5), "0.001 to 1e5");
+        let numbers = [
+            (
+                "particles",
+                self.particles as f64,
+                ((10.0, 1e4), "10 to 10000"),
+            ),
+            (
+                "window (epochs)",
+                self.window_epochs as f64,
+                ((1.0, 1e3), "1 to 1000"),
+            ),
+            (
+                "warm-up (epochs)",
+                self.warm_up_epochs as f64,
+                ((0.0, 1e6), "0 to 1000000"),
+            ),
+            ("initial deviation (m)", self.initial_sigma_m, spread),
+            ("position noise (m)", self.position_noise_m, spread),
+            ("clock noise (m)", self.clock_noise_m, spread),
+            (
+                "resampling share",
+                self.resample_below,
+                ((1e-3, 1.0), "0.001 to 1"),
+            ),
+            (
+                "fault width (m)",
+                self.fault_width_m,
+                ((1.0, 1e6), "1 to 1e6"),
+            ),
+            ("threshold", self.threshold, ((1e-3, 1e6), "0.001 to 1e6")),
+        ];
+        for (name, value, (limits, expected)) in numbers {
+            within(name, value, limits, expected)?;
+        }
         self.likelihood.check()?;
         if let Movement::Swarm(settings) = self.movement {
             settings.check()?;

@@ -89,6 +89,10 @@ struct SetAside {
 /// sum of log-likelihood ratios over satellites and window starts. A satellite alarmed on is set
 /// aside: its sub filter, which never saw it, becomes the main filter. It is taken back when the
 /// same odds speak for it.
+///
+/// The reference point is the caller's. A moving receiver takes the position its own filter predicts
+/// for each epoch ([`Reference::sight`](crate::Reference::sight)); the particles are then errors of that
+/// prediction, and the process noise is what the prediction may drift by.
 #[derive(Debug, Clone)]
 pub struct ParticleRaim {
     parameters: CheckedParticleParameters,

@@ -39,6 +39,9 @@ pub enum TrueNoise {
     Mixture,
     /// 70 % of the variance Gauss-Markov of 60 s, 30 % white mixture.
     Correlated,
+    /// 90 % of the variance stays with the satellite for the whole run, 9 % is Gauss-Markov of
+    /// 60 s, 1 % white mixture: what a good receiver in the open sees of orbits and atmosphere.
+    Biased,
 }
 
 /// What is true of a run.
@@ -97,22 +100,30 @@ pub fn residuals(truth: &Truth, seed: u64) -> Residuals {
     };
     let decay = (-1.0 / 60.0f64).exp();
     let mut slow = [0.0; SATELLITES].map(|_: f64| normal());
+    let biases = biases(seed);
     let mut clock_m = 0.0;
     let mut epoch = || {
         clock_m += CLOCK_WALK_M * normal();
         let mut residuals = [0.0; SATELLITES];
-        for (residual, slow) in residuals.iter_mut().zip(&mut slow) {
+        for ((residual, slow), bias) in residuals.iter_mut().zip(&mut slow).zip(biases) {
             let white = mixture(normal());
             *slow = decay * *slow + (1.0 - decay * decay).sqrt() * normal();
             let unit = match truth.noise {
                 TrueNoise::Mixture => white,
                 TrueNoise::Correlated => 0.7f64.sqrt() * *slow + 0.3f64.sqrt() * white,
+                TrueNoise::Biased => 0.9f64.sqrt() * bias + 0.3 * *slow + 0.1 * white,
             };
             *residual = clock_m + truth.sigma_m * unit;
         }
         residuals
     };
     (0..EPOCHS).map(|_| epoch()).collect()
+}
+
+/// What stays with each satellite over a run, of unit variance.
+fn biases(seed: u64) -> [f64; SATELLITES] {
+    let mut random = ChaCha8Rng::seed_from_u64(2_000_000 + seed);
+    std::array::from_fn(|_| StandardNormal.sample(&mut random))
 }
 
 /// The sights of epoch `k`, of the standard deviation the detectors assume; a step of `step_m`

@@ -14,6 +14,8 @@ use super::simulate::{Campaign, Run};
 
 /// Seeds of the main campaigns.
 pub const SEEDS: Range<u64> = 0..200;
+/// Seeds of what only compares.
+const FEWER_SEEDS: Range<u64> = 0..100;
 /// Seeds where one unstated choice after the other is varied.
 const SCAN_SEEDS: Range<u64> = 0..20;
 /// Noise of the paper's setting: overstated by the detectors.
@@ -29,6 +31,11 @@ const MATCHED_TRUTH: Truth = Truth {
 const CORRELATED_TRUTH: Truth = Truth {
     noise: TrueNoise::Correlated,
     sigma_m: 1.8,
+};
+/// Satellite biases of 2 m and little else, the deviation known.
+const BIASED_TRUTH: Truth = Truth {
+    noise: TrueNoise::Biased,
+    sigma_m: 2.1,
 };
 /// Assumed standard deviation of a pseudorange, m.
 const SIGMA_M: f64 = 3.0;
@@ -81,6 +88,8 @@ pub struct Study {
     pub matched: Vec<Case>,
     /// Time-correlated noise.
     pub correlated: Vec<Case>,
+    /// Satellite biases.
+    pub biased: Vec<Case>,
     /// The paper's setting with one unstated choice changed.
     pub scan: Vec<Case>,
 }
@@ -138,10 +147,6 @@ fn classical(process_noise_m: f64) -> [Plan; 4] {
 }
 
 fn paper_plans() -> Vec<Plan> {
-    let marginal = ParticleParameters {
-        clock: ClockState::Marginalised,
-        ..bootstrap()
-    };
     let literal = format!(
         "PSO-PF, weights then move, w {} c {}",
         SWARM.inertia, SWARM.attraction
@@ -167,7 +172,7 @@ fn paper_plans() -> Vec<Plan> {
         plan(
             "pf_marginal",
             "PF, clock integrated out",
-            particle(marginal),
+            particle(marginal()),
         ),
     ];
     plans.extend(classical(0.25));
@@ -207,6 +212,33 @@ fn correlated_plans() -> Vec<Plan> {
     ];
     plans.extend(classical(0.25));
     plans
+}
+
+fn biased_plans() -> Vec<Plan> {
+    let mixture = ParticleParameters {
+        likelihood: Likelihood::HEAVY_TAILED,
+        ..bootstrap()
+    };
+    let particle = Kind::Particle;
+    let mut plans = vec![
+        plan("pf", "PF", particle(bootstrap())),
+        plan(
+            "pf_marginal",
+            "PF, clock integrated out",
+            particle(marginal()),
+        ),
+        plan("pf_mixture", "PF, mixture likelihood", particle(mixture)),
+    ];
+    plans.extend(classical(0.25));
+    plans
+}
+
+/// The bootstrap filter with the clock integrated out.
+fn marginal() -> ParticleParameters {
+    ParticleParameters {
+        clock: ClockState::Marginalised,
+        ..bootstrap()
+    }
 }
 
 fn scan_plans() -> Vec<Plan> {
@@ -280,6 +312,12 @@ impl Study {
             paper: campaigns(paper_plans(), PAPER_TRUTH, SIGMA_M, SEEDS)?,
             matched: campaigns(matched_plans(), MATCHED_TRUTH, SIGMA_M, SEEDS)?,
             correlated: campaigns(correlated_plans(), CORRELATED_TRUTH, SIGMA_M, SEEDS)?,
+            biased: campaigns(
+                biased_plans(),
+                BIASED_TRUTH,
+                BIASED_TRUTH.sigma_m,
+                FEWER_SEEDS,
+            )?,
             scan,
         })
     }
