@@ -57,7 +57,7 @@ fn a_fault_is_named_and_forgiven_whatever_the_clock_does() {
             "{alarmed:?}"
         );
         let last = *aside.last().unwrap();
-        // About ten epochs of health take it back.
+        // A dozen epochs of health take it back.
         assert!((122..150).contains(&last), "{last}");
     }
 }

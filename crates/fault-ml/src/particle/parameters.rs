@@ -2,7 +2,7 @@
 
 use crate::particle::Likelihood;
 use crate::particle::swarm::SwarmSettings;
-use crate::{MonitorError, STATES, error::within};
+use crate::{MonitorError, STATES, Sight, error::within};
 
 /// What moves the predicted particles towards the measurement.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -57,6 +57,10 @@ pub struct ParticleParameters {
     /// Process noise of the clock, m per square root of a second. Default 0.25: a clock that
     /// walks by 0.1 m, with the same margin.
     pub clock_noise_m: f64,
+    /// Deviation the filters believe over the one a sight states, 0.1 to 100. Default 1. What
+    /// stays with a satellite for longer than the window is no news in every epoch, though the
+    /// ratios count it so: noise with biases needs about 1.5.
+    pub deviation_factor: f64,
     /// Believed shape of the measurement noise. Default Gaussian (Wang2016 (5)).
     pub likelihood: Likelihood,
     /// Share of the particles below which the effective number must fall for resampling, above 0
@@ -89,6 +93,7 @@ impl Default for ParticleParameters {
             initial_sigma_m: 3.0,
             position_noise_m: 0.25,
             clock_noise_m: 0.25,
+            deviation_factor: 1.0,
             likelihood: Likelihood::Gaussian,
             resample_below: 1.0,
             movement: Movement::Bootstrap,
@@ -116,7 +121,8 @@ impl ParticleParameters {
     }
 
     /// For a receiver at rest by [`ParticleMonitor`](crate::particle::ParticleMonitor): 200
-    /// particles, normal noise, and a clock that is integrated out, or sampled under a swarm.
+    /// particles, normal noise of 1.5 times the stated deviation, and a clock that is integrated
+    /// out, or sampled under a swarm.
     ///
     /// The clock noise has to cover the error of the median residual that the monitor steers its
     /// reference by, half a deviation of a pseudorange: 10 m where the clock is integrated out and
@@ -132,6 +138,7 @@ impl ParticleParameters {
         Self {
             particles: 200,
             clock_noise_m,
+            deviation_factor: 1.5,
             movement,
             clock,
             ..Self::default()
@@ -164,6 +171,11 @@ impl ParticleParameters {
             ("initial deviation (m)", self.initial_sigma_m, spread),
             ("position noise (m)", self.position_noise_m, spread),
             ("clock noise (m)", self.clock_noise_m, spread),
+            (
+                "deviation factor",
+                self.deviation_factor,
+                ((0.1, 100.0), "0.1 to 100"),
+            ),
             (
                 "resampling share",
                 self.resample_below,
@@ -221,6 +233,14 @@ impl CheckedParticleParameters {
     #[must_use]
     pub const fn get(&self) -> &ParticleParameters {
         &self.0
+    }
+
+    /// `sight` with the deviation the filters believe.
+    pub(super) fn believed(&self, sight: &Sight) -> Sight {
+        Sight {
+            sigma_m: sight.sigma_m * self.0.deviation_factor,
+            ..*sight
+        }
     }
 
     /// Standard deviations (m) of the process noise over `elapsed_s` seconds; a marginalised clock

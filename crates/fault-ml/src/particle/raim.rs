@@ -186,7 +186,9 @@ impl ParticleRaim {
         self.in_use.clear();
         let aside = &self.set_aside;
         let used = |s: &&Sight| !aside.iter().any(|a| a.id == s.id);
-        self.in_use.extend(sights.iter().filter(used));
+        let parameters = &self.parameters;
+        self.in_use
+            .extend(sights.iter().filter(used).map(|s| parameters.believed(s)));
         self.align();
         let main = self.step(elapsed_s);
         let decision = self.decide(main.log_evidence);
@@ -323,7 +325,8 @@ impl ParticleRaim {
             let Some(sight) = sights.iter().find(|s| s.id == aside.id) else {
                 continue;
             };
-            let healthy = self.main.log_expectation(sight, &self.parameters);
+            let sight = self.parameters.believed(sight);
+            let healthy = self.main.log_expectation(&sight, &self.parameters);
             aside.recovery = (aside.recovery + healthy + log_width).max(0.0);
         }
         let at = self.set_aside.iter().position(|a| a.recovery > threshold)?;

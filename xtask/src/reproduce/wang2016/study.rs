@@ -229,6 +229,14 @@ fn biased_plans() -> Vec<Plan> {
         ),
         plan("pf_mixture", "PF, mixture likelihood", particle(mixture)),
     ];
+    for (key, deviation_factor) in [("pf_1.5", 1.5), ("pf_2", 2.0)] {
+        let overstated = ParticleParameters {
+            deviation_factor,
+            ..marginal()
+        };
+        let label = format!("PF, clock integrated out, deviation times {deviation_factor}");
+        plans.push((key, label, particle(overstated)));
+    }
     plans.extend(classical(0.25));
     plans
 }
