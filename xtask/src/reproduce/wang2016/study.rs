@@ -319,7 +319,7 @@ impl Study {
         Ok(Self {
             paper: campaigns(paper_plans(), PAPER_TRUTH, SIGMA_M, SEEDS)?,
             matched: campaigns(matched_plans(), MATCHED_TRUTH, SIGMA_M, SEEDS)?,
-            correlated: campaigns(correlated_plans(), CORRELATED_TRUTH, SIGMA_M, SEEDS)?,
+            correlated: campaigns(correlated_plans(), CORRELATED_TRUTH, SIGMA_M, FEWER_SEEDS)?,
             biased: campaigns(
                 biased_plans(),
                 BIASED_TRUTH,
