@@ -3,5 +3,6 @@
 pub mod ci;
 pub mod code_noise;
 pub mod demo;
+pub mod reproduce;
 pub mod scenario;
 pub mod tidy;

@@ -9,6 +9,7 @@ use clap::{Parser, Subcommand};
 use xtask::ci::ci;
 use xtask::code_noise::{self, Experiment};
 use xtask::demo::demo;
+use xtask::reproduce::{Paper, reproduce};
 use xtask::scenario::command::{self as scenario, Command};
 use xtask::tidy::{Severity, tidy, workspace_root};
 
@@ -54,6 +55,15 @@ enum Task {
         /// Code loop bandwidth, Hz [default: the receiver's]
         #[arg(long, value_name = "HZ")]
         code_bandwidth: Option<f64>,
+    },
+    /// Repeat the experiments of a paper: summary.json, report.md and pictures.
+    Reproduce {
+        /// Which paper.
+        #[arg(value_enum)]
+        paper: Paper,
+        /// Folder that receives a folder of the paper's name.
+        #[arg(long, value_name = "DIR", default_value = "reproduced")]
+        out: PathBuf,
     },
     /// Check the layers, module comments and what no compiler checks.
     Tidy,
@@ -112,6 +122,11 @@ fn perform(task: Task) -> Result<ExitCode> {
             }
             writeln!(out, "{}", code_noise::table(&experiment)?)?;
             Ok(ExitCode::SUCCESS)
+        }
+        Task::Reproduce { paper, out: folder } => {
+            let outcome = reproduce(paper, &folder)?;
+            writeln!(out, "{outcome}")?;
+            Ok(verdict(outcome.holds()))
         }
         Task::Tidy => {
             let findings = tidy(&workspace_root())?;

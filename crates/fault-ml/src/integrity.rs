@@ -70,6 +70,13 @@ pub trait IntegrityMonitor {
         measurements: &[SatelliteMeasurement],
     ) -> Result<IntegrityReport, MonitorError>;
 
+    /// Satellites alarmed on in earlier epochs or this one that the monitor does not yet believe
+    /// again. A later epoch without them may well be healthy: they are faulty all the same. None
+    /// for a monitor that looks at every epoch anew.
+    fn set_aside(&self) -> &[u32] {
+        &[]
+    }
+
     /// Forgets all epochs.
     fn reset(&mut self);
 }

@@ -6,6 +6,10 @@
 //!
 //! [`InnovationTest`] is the first monitor: it needs no training.
 //!
+//! [`particle`] holds integrity monitoring by particle filters, [`classical`] the detectors it is
+//! measured against. Both take [`Sight`]s, lines of sight and residuals about a reference point, and
+//! know nothing of orbits or signals.
+//!
 //! ```
 //! use fault_ml::{Cadence, ChannelMonitor, ChannelVerdict, Innovation, Judgement, MonitorError};
 //!
@@ -46,14 +50,29 @@
 #![cfg_attr(doctest, doc = include_str!("../README.md"))]
 
 mod channel;
+pub mod classical;
 mod crossing_rate;
 mod error;
+#[cfg(test)]
+mod golden;
 mod innovation_test;
 mod integrity;
 mod judgement;
+mod linearise;
+mod noise_fit;
+mod noise_model;
+pub mod particle;
+mod sight;
+#[cfg(test)]
+mod test_sky;
+mod window;
 
 pub use channel::{Cadence, ChannelMonitor, ChannelVerdict, Innovation};
 pub use error::MonitorError;
 pub use innovation_test::{InnovationStatistic, InnovationTest, InnovationTestSettings};
 pub use integrity::{IntegrityMonitor, IntegrityReport, SatelliteMeasurement};
 pub use judgement::{Health, Judgement};
+pub use linearise::Reference;
+pub use noise_model::{CorrelatedNoise, NoiseGenerator};
+pub use sight::{STATES, Sight, check_sights};
+pub use window::CumulativeRatio;

@@ -1,0 +1,50 @@
+//! `Wang2016`: integrity monitoring by particle filters moved by a swarm, on simulated data.
+//!
+//! Everything that judges takes [`fault_ml::Sight`]s: real observations will only need another
+//! source of them beside [`setting`].
+
+pub mod calibrated;
+pub mod checks;
+pub mod detector;
+mod explain;
+pub mod figures;
+pub mod performance;
+pub mod report;
+pub mod setting;
+pub mod simulate;
+pub mod study;
+#[cfg(test)]
+mod tests;
+
+use anyhow::Result;
+
+use self::calibrated::Calibrated;
+use self::figures::Shown;
+use self::study::{Study, case};
+use super::Outcome;
+
+/// Repeats the paper on simulated data.
+///
+/// # Errors
+/// Where a campaign or a picture cannot be made.
+pub fn reproduce() -> Result<Outcome> {
+    let geometry = setting::geometry()?;
+    let study = Study::run(&geometry)?;
+    let calibrated = Calibrated::run(&geometry)?;
+    let checks = checks::checks(&study, &calibrated)?;
+    let shown = case(&study.paper, "pf")?.campaign;
+    let shown = Shown {
+        geometry: &geometry,
+        truth: shown.truth,
+        sigma_m: shown.sigma_m,
+        bootstrap: study::bootstrap(),
+        swarm: study::swarmed(study::SWARM),
+    };
+    Ok(Outcome {
+        paper: "wang2016",
+        figures: report::figures(&study, &calibrated),
+        report: report::report(&study, &calibrated, &checks)?,
+        pictures: shown.pictures()?,
+        checks,
+    })
+}
