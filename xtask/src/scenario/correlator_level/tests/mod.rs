@@ -1,0 +1,4 @@
+//! The bank against samples, against theory, and under the receiver.
+
+mod agreement;
+mod support;
