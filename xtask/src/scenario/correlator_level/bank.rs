@@ -70,7 +70,10 @@ impl CorrelatorLevelBank {
         scene.check()?;
         let timeline = Timeline::new(&scene);
         let mut tracks: Vec<_> = scene.emitters.into_iter().map(RayTracks::new).collect();
-        let power_hz = total_power_hz(&mut tracks, 0.0)?;
+        let mut power_hz = 0.0;
+        for track in &mut tracks {
+            power_hz += track.segment(0.0)?.0.nominal_power_hz();
+        }
         let model = FrontEndModel::new(&scene.reception, power_hz);
         let variance = model.noise_power + model.power_scale * power_hz;
         let sources = scene.interference.into_iter();
@@ -111,7 +114,7 @@ impl CorrelatorLevelBank {
 
     /// Variance of the components over an interval.
     fn variance(&self, power_hz: f64, heard: Heard) -> f64 {
-        self.model.noise_power + self.model.power_scale * (power_hz + heard.power_hz)
+        self.model.noise_power + self.model.power_scale * (power_hz * self.model.signal_part + heard.power_hz)
     }
 
     /// Gain and noise for `signal` at a Doppler over an interval.
@@ -129,7 +132,7 @@ impl CorrelatorLevelBank {
         let power_hz = self.power_hz(middle_s)?;
         let mut others_hz = power_hz;
         for track in self.tracks.iter_mut().filter(|t| t.signal == signal) {
-            others_hz -= track.segment((begin_s + 0.5 * (end_s - begin_s)).max(0.0))?.0.power_hz();
+            others_hz -= track.segment(middle_s)?.0.power_hz;
         }
         let variance = self.variance(power_hz, heard);
         let level = self.level.at(middle_s);
@@ -254,7 +257,7 @@ impl CorrelatorLevelBank {
 fn total_power_hz(tracks: &mut [RayTracks], elapsed_s: f64) -> Result<f64> {
     let mut total = 0.0;
     for track in tracks {
-        total += track.segment(elapsed_s)?.0.power_hz();
+        total += track.segment(elapsed_s)?.0.power_hz;
     }
     Ok(total)
 }

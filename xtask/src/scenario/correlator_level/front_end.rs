@@ -34,6 +34,8 @@ pub(super) struct FrontEndModel {
     pub(super) thermal_density: f64,
     /// Part of the distortion's power per component that a sum holds, per sample.
     pub(super) distortion_density: f64,
+    /// Part of a signal's power that the filter passes.
+    pub(super) signal_part: f64,
     /// Overlap of the code's spectrum with that of another code, s.
     pub(super) code_overlap_s: f64,
     /// Signal through the filter; none: no filter.
@@ -121,7 +123,15 @@ impl FrontEndModel {
             thermal_density,
             distortion_density: (density(&noise) / components - nominal_thermal)
                 / response.distortion,
-            code_overlap_s: code_overlap_s(|f| if filtered { filter.gain(f) } else { 1.0 }),
+            signal_part: if filtered {
+                code_integral(|f_hz| filter.gain(f_hz).powi(2))
+            } else {
+                1.0
+            },
+            code_overlap_s: code_integral(|f_hz| {
+                let gain = if filtered { filter.gain(f_hz) } else { 1.0 };
+                code_spectrum_s(f_hz) * gain * gain
+            }),
             signal_lobe: filtered.then(|| Lobe::new(&signal_kernel(&filter.taps, &colour))),
             noise_lobe: filtered.then(|| Lobe::new(&noise)),
             carrier_part: noise.points.iter().map(|p| p.1).sum::<f64>() / density(&noise),
@@ -239,13 +249,13 @@ pub(super) fn code_spectrum_s(offset_hz: f64) -> f64 {
     sinc * sinc / rate_hz
 }
 
-/// Integral of the squared code spectrum through a filter, s; 2 / (3 code rate) without one.
-fn code_overlap_s(gain: impl Fn(f64) -> f64) -> f64 {
+/// Integral of the code spectrum times `weight`.
+fn code_integral(weight: impl Fn(f64) -> f64) -> f64 {
     let reach_hz = 10.0 * Signal::GpsL1Ca.spec().code_rate_hz;
     let step_hz = reach_hz / SPECTRUM_STEPS as f64;
     let at = |k: usize| {
         let f_hz = (k as f64 + 0.5) * step_hz;
-        (code_spectrum_s(f_hz) * gain(f_hz)).powi(2)
+        code_spectrum_s(f_hz) * weight(f_hz)
     };
     2.0 * step_hz * (0..SPECTRUM_STEPS).map(at).sum::<f64>()
 }

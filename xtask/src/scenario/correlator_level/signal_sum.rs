@@ -149,7 +149,7 @@ impl SignalSum<'_> {
         let mut lag = chips - replica.code_phase_chips - replica.code_rate_hz * into_s;
         lag -= CODE_CHIPS * (lag / CODE_CHIPS).round();
         if let Some(grid) = self.signal_grid {
-            let begins = chips - ray.chips.slope(x_s) * 0.5 * duration_s;
+            let begins = chips - ray.chips.slope(x_s) * 0.5 * (samples - 1.0) / rate_hz;
             lag -= grid.lag_chips(begins);
         }
         let drift = (ray.chips.slope(x_s) - replica.code_rate_hz) * duration_s;

@@ -4,7 +4,7 @@ use gnss_signal::sample::SampleFormat;
 use gnss_signal::{CorrelatorBank, IfCorrelatorBank, InstructionSet, Replica, TapOffsets, Taps};
 use num_complex::Complex64;
 
-use super::support::{Mismatch, PRN, Reflection, TestEmitter, lnav, path, reception, replica, scene};
+use super::support::{Mismatch, Reflection, TestEmitter, lnav, path, reception, replica, scene};
 use crate::scenario::antenna::{Gap, Reception, Scene};
 use crate::scenario::correlator_level::CorrelatorLevelBank;
 use crate::scenario::if_signal::Synthesiser;
@@ -94,9 +94,12 @@ fn deviations(both: &Both) -> Vec<(String, f64)> {
     all
 }
 
+/// Three standard errors for a case as a whole: 3.8 for each of its 18 quantities.
+const LIMIT: f64 = 3.8;
+
 fn assert_agreement(name: &str, both: &Both) {
     for (quantity, deviation) in deviations(both) {
-        assert!(deviation.abs() < 3.0, "{name}: {quantity} is {deviation} standard errors off");
+        assert!(deviation.abs() < LIMIT, "{name}: {quantity} is {deviation} standard errors off");
     }
     // The mean of N squares of nearly Gaussian numbers errs by 1.5 / sqrt(N), twice.
     let [p, q] = both.powers;
@@ -290,5 +293,4 @@ fn bits_edges_and_gaps_fall_on_the_same_samples() {
         // Noise of both, four deviations; the prompt sum has 40.
         assert!(difference.norm() < 4.0 * 2f64.sqrt() * deviation);
     }
-    assert_eq!(PRN, 5);
 }
