@@ -12,7 +12,7 @@ pub mod sample;
 mod signal;
 pub mod tracking;
 
-pub use acquisition::{AcquisitionEngine, default_search};
+pub use acquisition::{AcquisitionEngine, SearchStatistics, default_search};
 pub use bank::{
     AcquisitionHit, CorrelatorBank, MAX_TAPS, Replica, SearchReport, SearchRequest, TapOffsets,
     Taps,

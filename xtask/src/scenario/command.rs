@@ -13,6 +13,7 @@ use receiver::summary::Summary;
 
 use super::built::Scenario;
 use super::catalogue;
+use super::correlator_level::CorrelatorLevelBank;
 use super::if_signal::Synthesiser;
 use super::make::{self, Level};
 use super::spec::ScenarioFile;
@@ -144,6 +145,6 @@ pub fn receive(
                     .context("scenario")?;
             Ok(session.run(bank)?)
         }
-        Level::Correlator => bail!("no correlator level yet"),
+        Level::Correlator => Ok(session.run(CorrelatorLevelBank::new(scene)?)?),
     }
 }

@@ -7,6 +7,7 @@ pub mod catalogue;
 pub mod clock;
 pub mod command;
 pub mod constellation;
+pub mod correlator_level;
 pub mod counterfeit;
 pub mod emitter;
 pub mod fault;

@@ -22,6 +22,7 @@ mod kernels;
 mod refine;
 mod search;
 mod spectra;
+mod statistics;
 #[cfg(test)]
 mod tests;
 mod threshold;
@@ -37,6 +38,7 @@ use grid::Grid;
 use refine::{Refined, refine};
 use search::{Cell, CodeSearch, Searcher};
 use spectra::Spectra;
+pub use statistics::SearchStatistics;
 use threshold::{Thresholds, thresholds};
 
 /// Samples in one code period at the acquisition rate: the main lobe of the code, in a length that
@@ -130,9 +132,7 @@ impl AcquisitionEngine {
         }
         let baseband = self.baseband.reduce(samples, grid.periods() * POINTS);
         let spectra = Spectra::new(grid, baseband, &mut self.planner);
-        let cells = grid.cells_per_code() * request.signals.len().max(1) as f64;
-        let sums = grid.blocks as u32;
-        let thresholds = thresholds(sums, cells, request.false_alarm_probability)?;
+        let thresholds = request_thresholds(grid, request)?;
         let codes: Vec<&[Complex32]> = request
             .signals
             .iter()
@@ -159,10 +159,22 @@ impl AcquisitionEngine {
                 report.best_missed = Some((*signal, cell.statistic));
             }
         }
-        drop_cross_correlation(&mut report.hits);
+        report.drop_cross_correlation();
         report.hits.sort_by_key(|hit| hit.signal);
         Ok(report)
     }
+
+    /// Part of a white signal's C/N0 that this front end's samples keep in the band searched.
+    #[must_use]
+    pub const fn band_gain(&self) -> f64 {
+        self.band_gain
+    }
+}
+
+fn request_thresholds(grid: Grid, request: &SearchRequest) -> Result<Thresholds, SignalError> {
+    let cells = grid.cells_per_code() * request.signals.len().max(1) as f64;
+    let sums = grid.blocks as u32;
+    thresholds(sums, cells, request.false_alarm_probability)
 }
 
 fn check_front_end(front_end: FrontEnd) -> Result<(), SignalError> {
@@ -218,11 +230,13 @@ fn search_all(
     })
 }
 
-/// Keeps the hits that the cross-correlation of no stronger signal can explain.
-fn drop_cross_correlation(hits: &mut Vec<AcquisitionHit>) {
-    let strongest = hits.iter().map(|hit| hit.cn0_dbhz).fold(0.0, f64::max);
-    let least = LEAST_CN0_DBHZ.max(strongest - CROSS_CORRELATION_DB);
-    hits.retain(|hit| hit.cn0_dbhz >= least);
+impl SearchReport {
+    /// Keeps the hits that the cross-correlation of no stronger signal can explain.
+    pub fn drop_cross_correlation(&mut self) {
+        let strongest = self.hits.iter().map(|hit| hit.cn0_dbhz).fold(0.0, f64::max);
+        let least = LEAST_CN0_DBHZ.max(strongest - CROSS_CORRELATION_DB);
+        self.hits.retain(|hit| hit.cn0_dbhz >= least);
+    }
 }
 
 fn hit(

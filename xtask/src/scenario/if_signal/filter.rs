@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 use super::baseband::Planes;
 
 /// Samples made for each sample delivered: a front end filters before it samples.
-pub(super) const OVERSAMPLING: usize = 4;
+pub(in crate::scenario) const OVERSAMPLING: usize = 4;
 /// Half the length of the filter, samples delivered; the transition is 3.3 / 65 of their rate wide.
 pub(super) const HALF_LENGTH: usize = 32;
 const HALF_TAPS: usize = HALF_LENGTH * OVERSAMPLING;
@@ -75,6 +75,13 @@ fn product(taps: &[f32; TAPS], inputs: &[f32]) -> f32 {
         }
     }
     sums.iter().sum()
+}
+
+/// Coefficients of the filter that passes `bandwidth`, two-sided, as a fraction of the rate
+/// delivered: [`OVERSAMPLING`] to a sample, symmetric about the middle one, of unit sum.
+pub(in crate::scenario) fn impulse_response(bandwidth: f64) -> Vec<f64> {
+    let filter = LowPass::new(bandwidth);
+    filter.taps.iter().map(|tap| f64::from(*tap)).collect()
 }
 
 /// Turns baseband samples to the intermediate frequency.

@@ -15,4 +15,6 @@ mod filter;
 mod quantise;
 mod synthesiser;
 
+pub(super) use filter::{OVERSAMPLING, impulse_response};
+pub(super) use quantise::{RMS_8_BIT, STEP_2_BIT};
 pub use synthesiser::Synthesiser;

@@ -5,9 +5,9 @@ use gnss_signal::sample::SampleFormat;
 
 /// Rms of a component in 8-bit units: clipping lies at 4.5 standard deviations, rounding costs
 /// 0.0005 dB.
-const RMS_8_BIT: f64 = 28.0;
+pub(in crate::scenario) const RMS_8_BIT: f64 = 28.0;
 /// Step of a 2-bit quantiser over the rms: the best for Gaussian noise (loss 0.55 dB).
-const STEP_2_BIT: f64 = 0.996;
+pub(in crate::scenario) const STEP_2_BIT: f64 = 0.996;
 
 /// Turns components into bytes; keeps the bits of an unfinished byte.
 #[derive(Debug, Clone)]
