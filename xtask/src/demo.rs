@@ -163,6 +163,7 @@ fn scene(
                 intermediate_frequency_hz: 0.0,
                 swap_iq: false,
             },
+            bits: None,
             bandwidth_hz: Some(BANDWIDTH * SAMPLE_RATE_HZ),
             gain: Gain::Fixed,
         },
