@@ -103,7 +103,7 @@ fn normal<F: Floats>(radius: F::Words, direction: F::Words) -> (F, F) {
     const TO_UNIT: f32 = 1.0 / (1_u64 << 31) as f32;
     let unit = (radius.right::<1>().to_floats() + F::splat(0.5)) * F::splat(TO_UNIT);
     let radius = (logarithm(unit) * F::splat(-2.0)).max(F::splat(0.0)).sqrt();
-    let (cosine, sine) = quarter(direction.left::<2>());
+    let (cosine, sine) = quarter::<F>(direction.left::<2>());
     // Two bits choose one of four quarters: exchange, and the sign of the cosine.
     let exchange = F::Words::splat(0) - (direction.right::<31>());
     let sign = (direction.left::<1>()) & F::Words::splat(1 << 31);
