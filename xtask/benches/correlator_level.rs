@@ -37,6 +37,7 @@ fn scene(emitters: Vec<Box<dyn Emitter>>, duration_s: f64) -> Scene {
                 swap_iq: false,
             },
             bandwidth_hz: Some(0.8 * RATE_HZ),
+            bits: None,
             gain: Gain::Fixed,
         },
         duration_s,

@@ -140,6 +140,7 @@ fn scene(experiment: &Experiment, case: Case, path: UniformPath, seed: u64) -> R
                 intermediate_frequency_hz: 0.0,
                 swap_iq: false,
             },
+            bits: None,
             bandwidth_hz: case.bandwidth.map(|b| b * case.sample_rate_hz),
             gain: Gain::Fixed,
         },

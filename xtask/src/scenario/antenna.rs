@@ -128,7 +128,13 @@ pub enum Gain {
 pub struct Reception {
     /// The samples to make.
     pub samples: SampleDescription,
+    /// Bits of the quantiser (1 to 8) where the format has room for more: odd levels about zero;
+    /// none: all that the format holds.
+    pub bits: Option<u8>,
     /// Two-sided bandwidth of the front-end filter, Hz, centred on the carrier; none: no filter.
+    ///
+    /// Of real samples, a band that reaches below zero or above half the sample rate folds, with
+    /// its noise, as it does behind a real mixer; without a filter C/N0 counts what is folded.
     pub bandwidth_hz: Option<f64>,
     /// Level control.
     pub gain: Gain,
@@ -159,8 +165,8 @@ impl Scene {
         let samples = &self.reception.samples;
         let (rate_hz, if_hz) = (samples.sample_rate_hz, samples.intermediate_frequency_hz);
         ensure!(
-            (1e6..=1e9).contains(&rate_hz),
-            "sample rate is {rate_hz} Hz: expected 1e6 to 1e9"
+            (1.1e6..=1e9).contains(&rate_hz),
+            "sample rate is {rate_hz} Hz: expected 1.1e6 to 1e9"
         );
         let limit_hz = rate_hz / 2.0;
         ensure!(

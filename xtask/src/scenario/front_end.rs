@@ -21,6 +21,8 @@ pub struct FrontEndSpec {
     bandwidth_hz: Option<f64>,
     /// Time constant of the level control, s; without it the gain is fixed.
     agc_time_s: Option<f64>,
+    /// Bits of the quantiser, 1 to 8, where the format has room for more.
+    bits: Option<u8>,
     /// Whether I and Q are exchanged.
     #[serde(default)]
     swap_iq: bool,
@@ -74,6 +76,7 @@ impl FrontEndSpec {
                 intermediate_frequency_hz: if_hz,
                 swap_iq: self.swap_iq,
             },
+            bits: self.bits,
             bandwidth_hz: self.bandwidth_hz,
             gain,
         })

@@ -43,6 +43,11 @@ impl Profile {
         }
     }
 
+    /// Its instants in order, s.
+    pub fn instants_s(&self) -> impl Iterator<Item = f64> {
+        self.points.iter().map(|point| point.0)
+    }
+
     /// First and last instant, s.
     #[must_use]
     pub fn span_s(&self) -> (f64, f64) {

@@ -14,7 +14,10 @@ use gnss_signal::Signal;
 use super::code_correlation::{Kernel, Lobe};
 use super::quantiser::{LevelTable, Quantiser, Response};
 use crate::scenario::antenna::Reception;
-use crate::scenario::if_signal::{OVERSAMPLING, impulse_response};
+use crate::scenario::if_signal::{REACH, filter_response};
+
+/// Points of the filter's response to a sample.
+const OVERSAMPLING: usize = 4;
 
 /// Steps of integrals over frequency.
 const SPECTRUM_STEPS: usize = 2000;
@@ -96,7 +99,9 @@ impl FrontEndModel {
         } else {
             vec![1.0]
         };
-        let power_scale = 2.0 / (components * rate_hz);
+        // Real samples without a filter hold the noise of both sides of the carrier.
+        let folds = !complex && !filtered;
+        let power_scale = if folds { 2.0 } else { 1.0 } / rate_hz;
         let rms_squared = covariance[0] + power_scale * signal_power_hz;
         let colour = Colour {
             covariance,
@@ -121,7 +126,7 @@ impl FrontEndModel {
         let kurtosis = quantiser.moment(4, 1.0) / response.power().powi(2);
         Self {
             components,
-            amplitude_scale: (components / rate_hz).sqrt(),
+            amplitude_scale: (0.5 * components * components * power_scale).sqrt(),
             power_scale,
             noise_power: colour.covariance[0],
             thermal_density,
@@ -158,6 +163,16 @@ impl FrontEndModel {
             self.filter.gain(offset_hz)
         }
     }
+}
+
+/// Coefficients of the filter that passes `bandwidth`, two-sided, as a fraction of the sample rate:
+/// [`OVERSAMPLING`] to a sample, symmetric about the middle one, of unit sum.
+fn impulse_response(bandwidth: f64) -> Vec<f64> {
+    let reach = (REACH * OVERSAMPLING) as i64;
+    let taps = (-reach..=reach).map(|k| filter_response(bandwidth, k as f64 / OVERSAMPLING as f64));
+    let taps: Vec<f64> = taps.collect();
+    let sum: f64 = taps.iter().sum();
+    taps.into_iter().map(|tap| tap / sum).collect()
 }
 
 /// The filter's impulse response over chips; it works on means of the code over its own samples.
@@ -286,6 +301,7 @@ mod tests {
                 swap_iq: false,
             },
             bandwidth_hz: bandwidth.map(|b| b * 4e6),
+            bits: None,
             gain: Gain::Fixed,
         };
         FrontEndModel::new(&reception, 0.0)

@@ -133,6 +133,7 @@ mod tests {
                 swap_iq: false,
             },
             bandwidth_hz: None,
+            bits: None,
             gain: Gain::Fixed,
         };
         let source = Interference {

@@ -10,7 +10,10 @@ use std::f64::consts::{SQRT_2, TAU};
 use gnss_signal::sample::SampleFormat;
 use statrs::function::erf::erfc;
 
-use crate::scenario::if_signal::{RMS_8_BIT, STEP_2_BIT};
+use crate::scenario::if_signal::{RMS_8_BIT, STEPS};
+
+/// Step of two bits.
+const STEP_2_BIT: f64 = STEPS[0] as f64;
 
 /// Orders of the expansion beyond the first: 3, 5, .. 21. Only products of different samples
 /// need them, whose correlation is below 1.
@@ -58,7 +61,7 @@ impl Quantiser {
             },
             _ => Self {
                 thresholds: (-127..127)
-                    .map(|k| (f64::from(k) + 0.5) / RMS_8_BIT)
+                    .map(|k| (f64::from(k) + 0.5) / f64::from(RMS_8_BIT))
                     .collect(),
                 height: 1.0,
             },

@@ -1,169 +1,210 @@
-//! The front-end filter: a linear-phase low-pass whose delay is taken out.
+//! Symmetric filters whose delay is taken out: from half samples to samples, and the front end.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::PI;
 
-use super::baseband::Planes;
+use super::lanes::{self, Floats, Kernel, LANES};
+use super::planes::Planes;
 
-/// Samples made for each sample delivered: a front end filters before it samples.
-pub(in crate::scenario) const OVERSAMPLING: usize = 4;
-/// Half the length of the filter, samples delivered; the transition is 3.3 / 65 of their rate wide.
-pub(super) const HALF_LENGTH: usize = 32;
-const HALF_TAPS: usize = HALF_LENGTH * OVERSAMPLING;
-const TAPS: usize = 2 * HALF_TAPS + 1;
+/// Half the length of the front-end filter, samples; its transition is 3.3 / 65 of the rate wide.
+pub(in crate::scenario) const REACH: usize = 32;
+const TAPS: usize = 2 * REACH + 1;
 
-/// Partial sums of a tap product.
-const LANES: usize = 16;
+/// Half the length of the half-band filter, in samples of each of its two inputs.
+pub(super) const HALF_BAND_REACH: usize = 12;
 
-/// A windowed-sinc low-pass (Hamming) with unit gain at zero frequency, before the sampler.
-#[derive(Debug, Clone)]
+/// Vectors of samples that one pass over the taps makes.
+const VECTORS: usize = 4;
+const STRIDE: usize = VECTORS * LANES;
+
+/// The low-pass of the front end: a windowed sinc (Hamming) with unit gain at zero frequency.
+#[derive(Debug, Clone, PartialEq)]
 pub(super) struct LowPass {
-    taps: Box<[f32; TAPS]>,
-    history: Planes,
+    taps: [f32; TAPS],
 }
 
 impl LowPass {
-    /// Passes `bandwidth`, two-sided, as a fraction of the rate delivered.
+    /// Passes `bandwidth`, two-sided, as a fraction of the sample rate.
     pub(super) fn new(bandwidth: f64) -> Self {
-        let tap = |k: usize| {
-            let from_middle = k as f64 - HALF_TAPS as f64;
-            let x = PI * bandwidth / OVERSAMPLING as f64 * from_middle;
-            let sinc = if x == 0.0 { 1.0 } else { x.sin() / x };
-            sinc * (0.54 + 0.46 * (PI * from_middle / (HALF_TAPS + 1) as f64).cos())
-        };
+        let tap = |k: usize| response(bandwidth, k as f64 - REACH as f64);
         let gain: f64 = (0..TAPS).map(tap).sum();
-        let zeros = vec![0.0; 2 * HALF_TAPS];
         Self {
-            taps: Box::new(std::array::from_fn(|k| (tap(k) / gain) as f32)),
-            history: Planes {
-                i: zeros.clone(),
-                q: zeros,
-            },
+            taps: std::array::from_fn(|k| (tap(k) / gain) as f32),
         }
     }
 
-    /// What is left of the power of white noise that has a variance of 1 at the rate delivered.
+    /// What is left of the power of white noise.
     pub(super) fn noise_gain(&self) -> f64 {
-        let squares = self.taps.iter().map(|tap| f64::from(*tap).powi(2));
-        OVERSAMPLING as f64 * squares.sum::<f64>()
+        self.taps.iter().map(|tap| f64::from(*tap).powi(2)).sum()
     }
 
-    /// Replaces [`OVERSAMPLING`] times `samples` of `planes` by `samples` filtered ones,
-    /// [`HALF_LENGTH`] samples older.
-    pub(super) fn filter(&mut self, samples: usize, planes: &mut Planes) {
-        filter_plane(&self.taps, samples, &mut self.history.i, &mut planes.i);
-        filter_plane(&self.taps, samples, &mut self.history.q, &mut planes.q);
-    }
-}
-
-/// One plane; `history` holds the last 2 [`HALF_TAPS`] inputs.
-fn filter_plane(taps: &[f32; TAPS], samples: usize, history: &mut Vec<f32>, plane: &mut [f32]) {
-    let made = samples * OVERSAMPLING;
-    history.extend_from_slice(&plane[..made]);
-    for (n, out) in plane[..samples].iter_mut().enumerate() {
-        *out = product(taps, &history[n * OVERSAMPLING..n * OVERSAMPLING + TAPS]);
-    }
-    history.drain(..made);
-}
-
-/// Sum of the products, in [`LANES`] partial sums that a processor makes at once.
-fn product(taps: &[f32; TAPS], inputs: &[f32]) -> f32 {
-    let mut sums = [0.0; LANES];
-    let (taps, inputs) = (taps.chunks(LANES), inputs.chunks(LANES));
-    for (taps, inputs) in taps.zip(inputs) {
-        for ((sum, tap), input) in sums.iter_mut().zip(taps).zip(inputs) {
-            *sum += tap * input;
+    /// Makes `samples` of `out` from planes that begin [`REACH`] samples before them, and
+    /// `skipped` more.
+    pub(super) fn filter(&self, from: &Planes, skipped: usize, samples: usize, out: &mut Planes) {
+        out.clear(samples);
+        for (from, to) in [(&from.i, &mut out.i), (&from.q, &mut out.q)] {
+            lanes::run(Convolve {
+                taps: &self.taps,
+                from: &from[skipped..],
+                to,
+            });
         }
     }
-    sums.iter().sum()
 }
 
-/// Coefficients of the filter that passes `bandwidth`, two-sided, as a fraction of the rate
-/// delivered: [`OVERSAMPLING`] to a sample, symmetric about the middle one, of unit sum.
-pub(in crate::scenario) fn impulse_response(bandwidth: f64) -> Vec<f64> {
-    let filter = LowPass::new(bandwidth);
-    filter.taps.iter().map(|tap| f64::from(*tap)).collect()
+/// Impulse response of the front-end filter, which passes `bandwidth` (two-sided, over the sample
+/// rate), so many samples from its middle: up to a factor, and zero beyond [`REACH`].
+pub(in crate::scenario) fn response(bandwidth: f64, from_middle: f64) -> f64 {
+    if from_middle.abs() > REACH as f64 {
+        return 0.0;
+    }
+    let window = 0.54 + 0.46 * (PI * from_middle / (REACH + 1) as f64).cos();
+    sinc(bandwidth * from_middle) * window
 }
 
-/// Turns baseband samples to the intermediate frequency.
+/// sin(pi x) / (pi x).
+fn sinc(x: f64) -> f64 {
+    if x == 0.0 {
+        1.0
+    } else {
+        (PI * x).sin() / (PI * x)
+    }
+}
+
+/// The low-pass from two samples a tick to one: half its taps are zero.
 ///
-/// `first_tick` is that of the first sample; phase is counted from tick 0.
-pub(super) fn shift(frequency: f64, first_tick: i64, samples: usize, planes: &mut Planes) {
-    let (step_sin, step_cos) = (TAU * frequency).sin_cos();
-    let turns = (frequency * first_tick as f64).rem_euclid(1.0);
-    let (mut sin, mut cos) = (TAU * turns).sin_cos();
-    let samples = planes.i[..samples].iter_mut().zip(&mut planes.q[..samples]);
-    for (i, q) in samples {
-        let (c, s) = (cos as f32, sin as f32);
-        (*i, *q) = (*i * c - *q * s, *i * s + *q * c);
-        (sin, cos) = (
-            sin * step_cos + cos * step_sin,
-            cos * step_cos - sin * step_sin,
+/// Flat to 0.425 of the sample rate; what lies beyond 0.575, and would fold into that, is 60 dB
+/// down; in between it falls to 6 dB at half the rate.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct HalfBand {
+    /// Taps on either side of the middle, from it outwards; that of the middle is 1/2.
+    taps: [f32; HALF_BAND_REACH],
+}
+
+impl HalfBand {
+    /// Shape of the Kaiser window for 60 dB (`Kaiser1974`).
+    const BETA: f64 = 5.65;
+
+    pub(super) fn new() -> Self {
+        let tap = |k: usize| {
+            let from_middle = (2 * k + 1) as f64;
+            let x = from_middle / (2 * HALF_BAND_REACH) as f64;
+            0.5 * sinc(0.5 * from_middle) * bessel_i0(Self::BETA * (1.0 - x * x).sqrt())
+                / bessel_i0(Self::BETA)
+        };
+        // With the middle, unit gain at zero frequency.
+        let gain: f64 = 4.0 * (0..HALF_BAND_REACH).map(tap).sum::<f64>();
+        Self {
+            taps: std::array::from_fn(|k| (tap(k) / gain) as f32),
+        }
+    }
+
+    /// Makes `samples` of `out` from samples on ticks and samples half a tick later, both from
+    /// [`HALF_BAND_REACH`] ticks before them on.
+    pub(super) fn decimate(&self, on: &Planes, between: &Planes, samples: usize, out: &mut Planes) {
+        out.clear(samples);
+        let planes = [
+            (&on.i, &between.i, &mut out.i),
+            (&on.q, &between.q, &mut out.q),
+        ];
+        for (on, between, to) in planes {
+            lanes::run(Decimate {
+                taps: &self.taps,
+                on,
+                between,
+                to,
+            });
+        }
+    }
+}
+
+/// Modified Bessel function of the first kind and order 0 (Abramowitz1964, 9.6.12).
+fn bessel_i0(x: f64) -> f64 {
+    let (mut term, mut sum) = (1.0, 1.0);
+    for k in 1..60 {
+        term *= (x / f64::from(2 * k)).powi(2);
+        sum += term;
+    }
+    sum
+}
+
+struct Convolve<'a> {
+    taps: &'a [f32; TAPS],
+    from: &'a [f32],
+    to: &'a mut [f32],
+}
+
+impl Kernel for Convolve<'_> {
+    #[inline(always)]
+    fn run<F: Floats>(self) {
+        let Self { taps, from, to } = self;
+        each_stride(to, |at, vectors| sum_of_taps::<F>(taps, from, at, vectors));
+    }
+}
+
+struct Decimate<'a> {
+    taps: &'a [f32; HALF_BAND_REACH],
+    on: &'a [f32],
+    between: &'a [f32],
+    to: &'a mut [f32],
+}
+
+impl Kernel for Decimate<'_> {
+    #[inline(always)]
+    fn run<F: Floats>(self) {
+        let Self {
+            taps,
+            on,
+            between,
+            to,
+        } = self;
+        each_stride(
+            to,
+            #[inline(always)]
+            |at, out| {
+                let mut sums = [F::splat(0.0); VECTORS];
+                for (j, tap) in taps.iter().enumerate() {
+                    let tap = F::splat(*tap);
+                    let after = strip(between, at + HALF_BAND_REACH + j, out.len());
+                    let before = strip(between, at + HALF_BAND_REACH - 1 - j, out.len());
+                    for ((sum, a), b) in sums.iter_mut().zip(after).zip(before) {
+                        *sum = *sum + (F::load(a) + F::load(b)) * tap;
+                    }
+                }
+                let middle = strip(on, at + HALF_BAND_REACH, out.len());
+                for ((sum, middle), out) in sums.iter().zip(middle).zip(out) {
+                    (*sum + F::load(middle) * F::splat(0.5)).store(out);
+                }
+            },
         );
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Gain at a frequency in units of the rate delivered.
-    fn response(filter: &LowPass, frequency: f64) -> f64 {
-        let from_middle = |k: usize| (k as f64 - HALF_TAPS as f64) / OVERSAMPLING as f64;
-        let taps = filter.taps.iter().enumerate();
-        taps.map(|(k, t)| f64::from(*t) * (TAU * frequency * from_middle(k)).cos())
-            .sum()
-    }
-
-    #[test]
-    fn passes_its_band_and_stops_the_rest() {
-        let filter = LowPass::new(0.8);
-        for k in 0..=200 {
-            let frequency = f64::from(k) / 100.0;
-            let gain = response(&filter, frequency);
-            // Half the transition is 0.026; Hamming ripples by 0.2 % and stops 53 dB.
-            if frequency < 0.37 {
-                assert!((gain - 1.0).abs() < 0.003, "{gain} at {frequency}");
-            } else if frequency > 0.43 {
-                assert!(gain.abs() < 0.003, "{gain} at {frequency}");
-            }
-        }
-        assert!((filter.noise_gain() - 0.8).abs() < 0.02);
-    }
-
-    #[test]
-    fn delays_by_half_its_length_over_blocks_of_any_size() {
-        // Cosine of the time in samples delivered.
-        let wave = |made: i64| (0.3 * made as f64 / OVERSAMPLING as f64).cos() as f32;
-        let mut filter = LowPass::new(0.5);
-        let (mut next, mut out) = (0, Vec::new());
-        for samples in [10, 1, 300, 64, 65] {
-            let made = samples * OVERSAMPLING as i64;
-            let plane: Vec<f32> = (next..next + made).map(wave).collect();
-            let mut planes = Planes {
-                i: plane.clone(),
-                q: plane,
-            };
-            filter.filter(samples as usize, &mut planes);
-            out.extend_from_slice(&planes.i[..samples as usize]);
-            next += made;
-        }
-        for (n, value) in out.iter().enumerate().skip(2 * HALF_LENGTH) {
-            // Ripple of the pass band.
-            let expected = wave((n as i64 - HALF_LENGTH as i64) * OVERSAMPLING as i64);
-            assert!((value - expected).abs() < 0.005);
+/// Convolution with symmetric taps of `out`, which begins at `at`.
+#[inline(always)]
+fn sum_of_taps<F: Floats>(taps: &[f32; TAPS], from: &[f32], at: usize, out: &mut [[f32; LANES]]) {
+    let mut sums = [F::splat(0.0); VECTORS];
+    for (j, tap) in taps.iter().enumerate() {
+        let tap = F::splat(*tap);
+        for (sum, input) in sums.iter_mut().zip(strip(from, at + j, out.len())) {
+            *sum = *sum + F::load(input) * tap;
         }
     }
+    for (sum, out) in sums.iter().zip(out) {
+        sum.store(out);
+    }
+}
 
-    #[test]
-    fn shifts_continuously_by_the_frequency() {
-        let mut planes = Planes {
-            i: vec![1.0; 1000],
-            q: vec![0.0; 1000],
-        };
-        shift(0.123, -40, 1000, &mut planes);
-        for (n, i) in planes.i.iter().enumerate() {
-            let expected = (TAU * 0.123 * (n as f64 - 40.0)).cos();
-            assert!((f64::from(*i) - expected).abs() < 1e-6);
-        }
+/// `vectors` vectors of a plane from `at` on.
+#[inline(always)]
+fn strip(plane: &[f32], at: usize, vectors: usize) -> &[[f32; LANES]] {
+    plane[at..at + vectors * LANES].as_chunks().0
+}
+
+/// Calls `make` with every stride of a plane and where it begins; the last may be shorter.
+#[inline(always)]
+fn each_stride(plane: &mut [f32], make: impl Fn(usize, &mut [[f32; LANES]])) {
+    let (vectors, _) = plane.as_chunks_mut::<LANES>();
+    for (k, vectors) in vectors.chunks_mut(VECTORS).enumerate() {
+        make(k * STRIDE, vectors);
     }
 }

@@ -1,100 +1,174 @@
 //! From numbers to the bytes of a sample format.
 
-use anyhow::{Result, bail};
+use anyhow::{Result, ensure};
 use gnss_signal::sample::SampleFormat;
 
 /// Rms of a component in 8-bit units: clipping lies at 4.5 standard deviations, rounding costs
 /// 0.0005 dB.
-pub(in crate::scenario) const RMS_8_BIT: f64 = 28.0;
-/// Step of a 2-bit quantiser over the rms: the best for Gaussian noise (loss 0.55 dB).
-pub(in crate::scenario) const STEP_2_BIT: f64 = 0.996;
+pub(in crate::scenario) const RMS_8_BIT: f32 = 28.0;
+/// Rms of a component in 16-bit units: 16 standard deviations, for what comes on top of noise.
+const RMS_16_BIT: f32 = 2000.0;
+/// Steps of uniform quantisers of 2 to 7 bits over the rms, best for Gaussian noise (`Max1960`;
+/// 2 bits: a loss of 0.55 dB).
+pub(in crate::scenario) const STEPS: [f32; 6] = [0.996, 0.586, 0.335, 0.188, 0.104, 0.0569];
 
-/// Turns components into bytes; keeps the bits of an unfinished byte.
-#[derive(Debug, Clone)]
+/// Turns components into bytes.
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Quantiser {
-    scale: f32,
-    code: fn(f32) -> u8,
-    bits: u32,
-    most_significant_first: bool,
-    partial: u8,
-    filled: u32,
+    levels: Levels,
+    layout: Layout,
+}
+
+/// How a number becomes a level.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Levels {
+    /// The number.
+    Float,
+    /// The nearest integer to so many times the number, at most a largest one.
+    Integers { per_rms: f32, largest: f32 },
+    /// An odd integer: as far from 0 as so many steps of the number, and one.
+    Odd { per_rms: f32, largest: f32 },
+}
+
+/// How a level is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Layout {
+    Float32,
+    Int16,
+    /// A byte, with an offset.
+    Byte(i8),
+    Sign(Order),
+    TwosComplement2(Order),
+    SignMagnitude(Order),
+}
+
+/// Where in a byte the first of several components stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Order {
+    MostSignificantFirst,
+    LeastSignificantFirst,
 }
 
 impl Quantiser {
-    /// A quantiser for `format` of components with root mean square `rms`.
-    pub(super) fn new(format: SampleFormat, rms: f64) -> Result<Self> {
-        type Code = fn(f32) -> u8;
-        let (code, bits, most_significant_first): (Code, u32, bool) = match format {
-            SampleFormat::Ri8 | SampleFormat::Ci8 => (signed_byte, 8, true),
-            SampleFormat::Ru8 | SampleFormat::Cu8 => (offset_byte, 8, true),
-            SampleFormat::R1Msb | SampleFormat::C1Msb => (sign, 1, true),
-            SampleFormat::R1Lsb | SampleFormat::C1Lsb => (sign, 1, false),
-            SampleFormat::R2Msb => (twos_complement, 2, true),
-            SampleFormat::R2Lsb => (twos_complement, 2, false),
-            SampleFormat::R2smMsb => (sign_magnitude, 2, true),
-            SampleFormat::R2smLsb => (sign_magnitude, 2, false),
-            other => bail!("samples are made with 1, 2 or 8 bits a component, not as {other}"),
+    /// A quantiser for `format`, of `bits` bits where that has room for more.
+    ///
+    /// # Errors
+    /// Where a format cannot hold these bits.
+    pub(super) fn new(format: SampleFormat, bits: Option<u8>) -> Result<Self> {
+        use Order::{LeastSignificantFirst as Lsb, MostSignificantFirst as Msb};
+        use SampleFormat as F;
+        let (layout, room) = match format {
+            F::Rf32Le | F::Cf32Le => (Layout::Float32, 32),
+            F::Ri16Le | F::Ci16Le => (Layout::Int16, 16),
+            F::Ri8 | F::Ci8 => (Layout::Byte(0), 8),
+            F::Ru8 | F::Cu8 => (Layout::Byte(-128), 8),
+            F::R1Msb | F::C1Msb => (Layout::Sign(Msb), 1),
+            F::R1Lsb | F::C1Lsb => (Layout::Sign(Lsb), 1),
+            F::R2Msb => (Layout::TwosComplement2(Msb), 2),
+            F::R2Lsb => (Layout::TwosComplement2(Lsb), 2),
+            F::R2smMsb => (Layout::SignMagnitude(Msb), 2),
+            F::R2smLsb => (Layout::SignMagnitude(Lsb), 2),
+            other => anyhow::bail!("samples cannot be made as {other}"),
         };
-        let scale = match bits {
-            8 => RMS_8_BIT / rms,
-            _ => 1.0 / (STEP_2_BIT * rms),
+        let depth = bits.unwrap_or(room);
+        let fits = depth == room || (matches!(room, 8 | 16) && matches!(depth, 1..=8));
+        ensure!(
+            fits,
+            "quantiser of {depth} bits for {format}: expected {room}, or 1 to 8 where that is more"
+        );
+        let levels = match depth {
+            32 => Levels::Float,
+            16 => Levels::Integers {
+                per_rms: RMS_16_BIT,
+                largest: 32_767.0,
+            },
+            8 => Levels::Integers {
+                per_rms: RMS_8_BIT,
+                largest: 127.0,
+            },
+            1 => Levels::Odd {
+                per_rms: 1.0,
+                largest: 1.0,
+            },
+            _ => Levels::Odd {
+                per_rms: 1.0 / STEPS[usize::from(depth) - 2],
+                largest: ((1 << depth) - 1) as f32,
+            },
         };
-        Ok(Self {
-            scale: scale as f32,
-            code,
-            bits,
-            most_significant_first,
-            partial: 0,
-            filled: 0,
-        })
+        Ok(Self { levels, layout })
     }
 
-    /// Appends one component.
-    pub(super) fn push(&mut self, value: f32, out: &mut Vec<u8>) {
-        let code = (self.code)(value * self.scale);
-        if self.bits == 8 {
-            out.push(code);
-            return;
-        }
-        let shift = if self.most_significant_first {
-            8 - self.bits - self.filled
-        } else {
-            self.filled
-        };
-        self.partial |= code << shift;
-        self.filled += self.bits;
-        if self.filled == 8 {
-            self.finish(out);
+    /// Appends components in units of their rms. What does not fill a byte is padded with zeros:
+    /// only the last call may end so.
+    pub(super) fn append(&self, components: &[f32], out: &mut Vec<u8>) {
+        use Order::MostSignificantFirst;
+        match self.layout {
+            Layout::Float32 => out.extend(components.iter().flat_map(|x| x.to_le_bytes())),
+            Layout::Int16 => self.each(components, |level| {
+                out.extend_from_slice(&(level as i16).to_le_bytes());
+            }),
+            Layout::Byte(offset) => {
+                let start = out.len();
+                out.resize(start + components.len(), 0);
+                let mut bytes = out[start..].iter_mut();
+                self.each(components, |level| {
+                    if let Some(byte) = bytes.next() {
+                        *byte = (level as i8).wrapping_add(offset) as u8;
+                    }
+                });
+            }
+            Layout::Sign(order) => {
+                let reversed = order == MostSignificantFirst;
+                out.extend(components.chunks(8).map(|eight| {
+                    let bits = eight.iter().enumerate();
+                    let byte = bits.fold(0, |byte, (k, x)| byte | u8::from(*x >= 0.0) << k);
+                    if reversed { byte.reverse_bits() } else { byte }
+                }));
+            }
+            Layout::TwosComplement2(order) => {
+                // -3, -1, 1, 3 are -2, -1, 0, 1.
+                self.pairs(components, order, out, |level| (level as i8 >> 1) as u8 & 3);
+            }
+            Layout::SignMagnitude(order) => self.pairs(components, order, out, |level| {
+                u8::from(level < 0.0) << 1 | u8::from(level.abs() > 1.0)
+            }),
         }
     }
 
-    /// Appends the unfinished byte, if there is one, padded with zeros.
-    pub(super) fn finish(&mut self, out: &mut Vec<u8>) {
-        if self.filled > 0 {
-            out.push(self.partial);
+    /// Calls `write` with every level.
+    fn each(&self, components: &[f32], mut write: impl FnMut(f32)) {
+        match self.levels {
+            Levels::Float => components.iter().for_each(|x| write(*x)),
+            Levels::Integers { per_rms, largest } => components
+                .iter()
+                .for_each(|x| write(nearest((x * per_rms).clamp(-largest, largest)))),
+            Levels::Odd { per_rms, largest } => components
+                .iter()
+                .for_each(|x| write((2.0 * (x * per_rms).floor() + 1.0).clamp(-largest, largest))),
         }
-        (self.partial, self.filled) = (0, 0);
+    }
+
+    fn pairs(&self, components: &[f32], order: Order, out: &mut Vec<u8>, code: impl Fn(f32) -> u8) {
+        for four in components.chunks(4) {
+            let (mut byte, mut k) = (0, 0);
+            self.each(four, |level| {
+                let shift = match order {
+                    Order::MostSignificantFirst => 6 - 2 * k,
+                    Order::LeastSignificantFirst => 2 * k,
+                };
+                byte |= code(level) << shift;
+                k += 1;
+            });
+            out.push(byte);
+        }
     }
 }
 
-fn signed_byte(x: f32) -> u8 {
-    x.round().clamp(-127.0, 127.0) as i8 as u8
-}
-
-fn offset_byte(x: f32) -> u8 {
-    signed_byte(x).wrapping_add(128)
-}
-
-fn sign(x: f32) -> u8 {
-    u8::from(x >= 0.0)
-}
-
-fn twos_complement(x: f32) -> u8 {
-    x.floor().clamp(-2.0, 1.0) as i8 as u8 & 3
-}
-
-fn sign_magnitude(x: f32) -> u8 {
-    u8::from(x < 0.0) << 1 | u8::from(x.abs() >= 1.0)
+/// The nearest integer (an even one half way) to a number below 2^22: what adding and taking off
+/// 3 2^22 leaves, on every processor in two instructions.
+fn nearest(x: f32) -> f32 {
+    const HOLDS_INTEGERS: f32 = 12_582_912.0;
+    x + HOLDS_INTEGERS - HOLDS_INTEGERS
 }
 
 #[cfg(test)]
@@ -103,12 +177,16 @@ mod tests {
 
     use super::*;
 
-    /// What the receiver makes of the bytes.
-    fn read_back(format: SampleFormat, values: &[f32]) -> Vec<i8> {
-        let mut quantiser = Quantiser::new(format, 1.0).unwrap();
+    fn bytes(format: SampleFormat, bits: Option<u8>, values: &[f32]) -> Vec<u8> {
         let mut bytes = Vec::new();
-        values.iter().for_each(|v| quantiser.push(*v, &mut bytes));
-        quantiser.finish(&mut bytes);
+        let quantiser = Quantiser::new(format, bits).unwrap();
+        quantiser.append(values, &mut bytes);
+        bytes
+    }
+
+    /// What the receiver makes of the bytes.
+    fn read_back(format: SampleFormat, bits: Option<u8>, values: &[f32]) -> Vec<i8> {
+        let bytes = bytes(format, bits, values);
         let description = SampleDescription {
             format,
             sample_rate_hz: 1e6,
@@ -126,31 +204,75 @@ mod tests {
         out
     }
 
+    const VALUES: [f32; 8] = [0.1, -0.2, 1.5, -9.0, 9.0, -1.2, 0.5, -0.5];
+
     #[test]
     fn the_receiver_reads_what_was_meant() {
-        let values = [0.1, -0.2, 1.5, -9.0, 9.0, -1.2, 0.5, -0.5];
-        for format in [
-            SampleFormat::Ri8,
-            SampleFormat::Ci8,
-            SampleFormat::Ru8,
-            SampleFormat::Cu8,
-        ] {
-            assert_eq!(
-                read_back(format, &values),
-                [3, -6, 42, -127, 127, -34, 14, -14]
-            );
+        use SampleFormat::*;
+        for format in [Ri8, Ci8, Ru8, Cu8] {
+            let read = read_back(format, None, &VALUES);
+            assert_eq!(read, [3, -6, 42, -127, 127, -34, 14, -14]);
         }
-        use SampleFormat::{C1Lsb, C1Msb, R1Lsb, R1Msb, R2Lsb, R2Msb, R2smLsb, R2smMsb};
         for format in [R1Msb, R1Lsb, C1Msb, C1Lsb] {
-            assert_eq!(read_back(format, &values), [1, -1, 1, -1, 1, -1, 1, -1]);
+            let read = read_back(format, None, &VALUES);
+            assert_eq!(read, [1, -1, 1, -1, 1, -1, 1, -1]);
         }
         for format in [R2Msb, R2Lsb, R2smMsb, R2smLsb] {
-            assert_eq!(read_back(format, &values), [1, -1, 3, -3, 3, -3, 1, -1]);
+            let read = read_back(format, None, &VALUES);
+            assert_eq!(read, [1, -1, 3, -3, 3, -3, 1, -1]);
         }
     }
 
     #[test]
-    fn wide_formats_are_refused() {
-        assert!(Quantiser::new(SampleFormat::Cf32Le, 1.0).is_err());
+    fn wide_formats_keep_the_numbers() {
+        let words = bytes(SampleFormat::Ci16Le, None, &VALUES);
+        let words = words
+            .chunks_exact(2)
+            .map(|b| i16::from_le_bytes([b[0], b[1]]));
+        let expected = [200, -400, 3000, -18_000, 18_000, -2400, 1000, -1000];
+        assert_eq!(words.collect::<Vec<_>>(), expected);
+        let floats = bytes(SampleFormat::Rf32Le, None, &VALUES);
+        let floats = floats
+            .chunks_exact(4)
+            .map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]));
+        assert_eq!(floats.collect::<Vec<_>>(), VALUES);
+    }
+
+    #[test]
+    fn fewer_bits_than_a_byte_are_odd_levels() {
+        // Steps of 0.335 from 0 up to 7 of them.
+        let read = read_back(SampleFormat::Ri8, Some(4), &VALUES);
+        assert_eq!(read, [1, -1, 9, -15, 15, -7, 3, -3]);
+        let read = read_back(SampleFormat::Cu8, Some(2), &VALUES);
+        assert_eq!(read, [1, -1, 3, -3, 3, -3, 1, -1]);
+    }
+
+    #[test]
+    fn an_unfinished_byte_is_padded() {
+        assert_eq!(bytes(SampleFormat::R1Lsb, None, &[1.0, -1.0, 1.0]), [0b101]);
+        assert_eq!(
+            bytes(SampleFormat::R1Msb, None, &[1.0, -1.0, 1.0]),
+            [0b1010_0000]
+        );
+        assert_eq!(bytes(SampleFormat::R2Msb, None, &[9.0]), [0b0100_0000]);
+    }
+
+    #[test]
+    fn depths_a_format_cannot_hold_are_refused() {
+        for (format, bits) in [
+            (SampleFormat::R2Lsb, 1),
+            (SampleFormat::Ri8, 0),
+            (SampleFormat::Ci8, 9),
+            (SampleFormat::Cf32Le, 8),
+        ] {
+            assert!(Quantiser::new(format, Some(bits)).is_err(), "{format}");
+        }
+    }
+
+    #[test]
+    fn integers_are_the_nearest() {
+        for (x, expected) in [(2.4, 2.0), (-2.6, -3.0), (2.5, 2.0), (-32_767.0, -32_767.0)] {
+            assert_eq!(nearest(x), expected);
+        }
     }
 }

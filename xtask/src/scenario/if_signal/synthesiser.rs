@@ -1,164 +1,206 @@
 //! A stream of samples made from a scene.
 
 use std::io;
+use std::num::NonZeroUsize;
+use std::sync::Arc;
 
 use anyhow::Result;
 use gnss_signal::sample::{SampleDescription, SampleSource};
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution, StandardNormal};
 
-use super::baseband::{LONGEST_BLOCK_S, Modulator, Planes, Sampling};
-use super::filter::{HALF_LENGTH, LowPass, OVERSAMPLING, shift};
+use super::front_end::{Bench, FrontEnd};
+use super::gain::GainControl;
+use super::grid::Grid;
+use super::plan::{Planner, Run};
+use super::planes::Planes;
 use super::quantise::Quantiser;
-use crate::scenario::antenna::{Ray, Scene};
+use super::supply::Supply;
+use crate::scenario::antenna::{Emitter, Ray, Scene};
 
-/// Makes the samples of a [`Scene`], a block of at most 2 ms at a time.
+/// Whether there is thermal noise.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum ThermalNoise {
+    /// White, at the density that C/N0 counts against.
+    #[default]
+    White,
+    /// None, at the level that samples would have with it.
+    Absent,
+}
+
+/// How a scene is made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Options {
+    /// Threads that make samples; none: as many as the machine has. One makes them in
+    /// [`SampleSource::read`], on the thread that asks. The bytes are the same.
+    pub threads: Option<NonZeroUsize>,
+    /// Thermal noise.
+    pub thermal_noise: ThermalNoise,
+}
+
+/// Makes the samples of a [`Scene`], a block of at most 2 ms at a time, a few blocks ahead.
 ///
-/// The same scene gives the same bytes, however they are read.
+/// The same scene gives the same bytes, however they are read, on any number of threads and any
+/// instruction set.
 pub struct Synthesiser {
     description: SampleDescription,
-    length_ticks: i64,
-    block_ticks: i64,
-    modulators: Vec<Modulator>,
-    noise: ChaCha8Rng,
-    filter: Option<LowPass>,
-    quantiser: Quantiser,
-    /// Next tick to make, and next to hand out (they differ by the filter's length).
-    made: i64,
-    out: i64,
-    planes: Planes,
+    supply: Supply,
+    receiving: Arc<Receiving>,
+    gain: GainControl,
     bytes: Vec<u8>,
     taken: usize,
 }
 
+/// Front end and quantiser, which all threads share.
+pub(super) struct Receiving {
+    front_end: FrontEnd,
+    quantiser: Quantiser,
+    description: SampleDescription,
+    gain: GainControl,
+}
+
+/// What a thread makes of a block.
+pub(super) enum Made {
+    /// Bytes to hand out.
+    Bytes(Vec<u8>),
+    /// Samples that wait for their gain.
+    Samples(Vec<(Run, Planes)>),
+}
+
 impl Synthesiser {
-    /// A synthesiser at the first sample of `scene`.
+    /// A synthesiser at the first sample of `scene`, on all threads of the machine.
     ///
     /// # Errors
     /// Where a value of the scene is impossible.
     pub fn new(scene: Scene) -> Result<Self> {
+        Self::with_options(scene, Options::default())
+    }
+
+    /// A synthesiser at the first sample of `scene`.
+    ///
+    /// # Errors
+    /// Where a value of the scene is impossible.
+    pub fn with_options(scene: Scene, options: Options) -> Result<Self> {
         scene.check()?;
-        let samples = scene.reception.samples;
-        let length_ticks = scene.length_ticks() as i64;
-        let bandwidth = scene.reception.bandwidth_hz;
-        let filter = bandwidth.map(|b| LowPass::new(b / samples.sample_rate_hz));
-        let scale = amplitude_scale(&samples);
-        let sampling = match filter {
-            Some(_) => Sampling::Mean,
-            None => Sampling::Instant,
+        let length_ticks = scene.length_ticks();
+        let Scene {
+            reception,
+            mut emitters,
+            interference,
+            gaps,
+            seed,
+            ..
+        } = scene;
+        let description = reception.samples;
+        let grid = Grid {
+            sample_rate_hz: description.sample_rate_hz,
         };
-        let noise_power = filter.as_ref().map_or(1.0, LowPass::noise_gain);
-        let mut emitters = scene.emitters;
-        let mut signal_power = 0.0;
-        for emitter in &mut emitters {
-            let mut rays = Vec::new();
-            emitter.rays(0.0, 0.0, &mut rays)?;
-            let square = |ray: &Ray| (ray.amplitude * scale).powi(2) / 2.0;
-            signal_power += rays.iter().map(square).sum::<f64>();
-        }
-        let rms = (noise_power + signal_power).sqrt();
-        // The filter looks half its length ahead and back.
-        let reach = if filter.is_some() {
-            HALF_LENGTH as i64
-        } else {
-            0
-        };
+        let front_end = FrontEnd::new(&reception, interference, seed, options.thermal_noise)?;
+        let rms = front_end.rms(cn0_sum_hz(&mut emitters)?);
+        let gain = GainControl::new(reception.gain, rms, description.sample_rate_hz);
+        let planner = Planner::new(emitters, &gaps, grid, length_ticks, gain.follows())?;
+        let receiving = Arc::new(Receiving {
+            front_end,
+            quantiser: Quantiser::new(description.format, reception.bits)?,
+            description,
+            gain: gain.clone(),
+        });
+        let threads = options
+            .threads
+            .or(std::thread::available_parallelism().ok());
         Ok(Self {
-            description: samples,
-            length_ticks,
-            block_ticks: (LONGEST_BLOCK_S * samples.sample_rate_hz) as i64,
-            noise: ChaCha8Rng::seed_from_u64(scene.seed),
-            filter,
-            quantiser: Quantiser::new(samples.format, rms)?,
-            made: -reach,
-            out: -2 * reach,
-            planes: Planes::default(),
+            description,
+            supply: Supply::new(planner, &receiving, threads.map_or(1, NonZeroUsize::get))?,
+            receiving,
+            gain,
             bytes: Vec::new(),
             taken: 0,
-            modulators: emitters
-                .into_iter()
-                .map(|emitter| Modulator::new(emitter, scale, sampling))
-                .collect(),
         })
     }
 
-    /// Makes the bytes of the next block; none at the end.
+    /// Gets the bytes of the next block; none at the end.
     fn next_block(&mut self) -> Result<()> {
         self.bytes.clear();
         self.taken = 0;
-        while self.bytes.is_empty() && self.out < self.length_ticks {
-            let samples = self.block_ticks as usize;
-            self.make(samples)?;
-            self.emit(samples);
+        // A block may be empty only at the end.
+        match self.supply.next()? {
+            Some(Made::Bytes(bytes)) => self.bytes = bytes,
+            Some(Made::Samples(runs)) => {
+                let mut components = Vec::new();
+                for (run, mut planes) in runs {
+                    self.receiving
+                        .finish(&mut self.gain, &run, &mut planes, &mut components);
+                }
+                self.receiving
+                    .quantiser
+                    .append(&components, &mut self.bytes);
+            }
+            None => {}
         }
         Ok(())
     }
+}
 
-    /// Signals, noise and filter over the next `samples` ticks.
-    fn make(&mut self, samples: usize) -> Result<()> {
-        let over = match self.filter {
-            Some(_) => OVERSAMPLING,
-            None => 1,
-        };
-        let rate_hz = self.description.sample_rate_hz * over as f64;
-        let (tick, made) = (self.made * over as i64, samples * over);
-        self.planes.clear(made);
-        for modulator in &mut self.modulators {
-            modulator.add(tick, made, rate_hz, &mut self.planes)?;
-        }
-        // The density of the noise is that of a deviation of 1 at the sample rate.
-        let deviation = (over as f32).sqrt();
-        let (i, q) = (&mut self.planes.i[..made], &mut self.planes.q[..made]);
-        for (i, q) in i.iter_mut().zip(q) {
-            let (a, b): (f32, f32) = (
-                StandardNormal.sample(&mut self.noise),
-                StandardNormal.sample(&mut self.noise),
-            );
-            *i += deviation * a;
-            *q += deviation * b;
-        }
-        if let Some(filter) = &mut self.filter {
-            filter.filter(samples, &mut self.planes);
-        }
-        self.made += samples as i64;
-        Ok(())
+impl Receiving {
+    pub(super) fn bench(&self) -> Bench {
+        self.front_end.bench()
     }
 
-    /// Shifts and quantises what was made, from tick 0 to the end of the scene.
-    fn emit(&mut self, samples: usize) {
-        let description = self.description;
-        let frequency = description.intermediate_frequency_hz / description.sample_rate_hz;
-        if frequency != 0.0 {
-            shift(frequency, self.out, samples, &mut self.planes);
-        }
-        let first = (-self.out).clamp(0, samples as i64) as usize;
-        let end = (self.length_ticks - self.out).clamp(0, samples as i64) as usize;
-        let complex = description.format.is_complex();
-        for n in first..end {
-            let (mut i, mut q) = (self.planes.i[n], self.planes.q[n]);
-            if description.swap_iq {
-                (i, q) = (q, i);
-            }
-            self.quantiser.push(i, &mut self.bytes);
-            if complex {
-                self.quantiser.push(q, &mut self.bytes);
+    /// Makes a block.
+    pub(super) fn make(&self, runs: Vec<Run>, bench: &mut Bench) -> Made {
+        let mut gain = self.gain.clone();
+        let mut components = Vec::new();
+        let mut waiting = Vec::new();
+        for run in runs {
+            let mut planes = Planes::default();
+            self.front_end
+                .receive(&run.segments, run.tick, run.samples, bench, &mut planes);
+            if gain.follows() {
+                waiting.push((run, planes));
+            } else {
+                self.finish(&mut gain, &run, &mut planes, &mut components);
             }
         }
-        self.out += samples as i64;
-        if self.out >= self.length_ticks {
-            self.quantiser.finish(&mut self.bytes);
+        if gain.follows() {
+            return Made::Samples(waiting);
+        }
+        let mut bytes = Vec::new();
+        self.quantiser.append(&components, &mut bytes);
+        Made::Bytes(bytes)
+    }
+
+    /// Brings samples to their level and appends the components of those delivered.
+    fn finish(
+        &self,
+        gain: &mut GainControl,
+        run: &Run,
+        planes: &mut Planes,
+        components: &mut Vec<f32>,
+    ) {
+        let complex = self.description.format.is_complex();
+        gain.apply(run.tick, run.samples, complex, planes);
+        if !run.delivered {
+            return;
+        }
+        let (mut i, mut q) = (&planes.i[..run.samples], &planes.q[..run.samples]);
+        if self.description.swap_iq {
+            (i, q) = (q, i);
+        }
+        if complex {
+            components.reserve(2 * run.samples);
+            components.extend(i.iter().zip(q).flat_map(|(i, q)| [*i, *q]));
+        } else {
+            components.extend_from_slice(i);
         }
     }
 }
 
-/// Amplitude of a signal over the square root of its C/N0 in Hz, where each component of the noise
-/// has unit variance.
-///
-/// Complex samples: C = A^2, N0 = 2 / fs. Real ones: C = A^2 / 2, N0 = 2 / fs.
-fn amplitude_scale(samples: &SampleDescription) -> f64 {
-    let complex = samples.format.is_complex();
-    (if complex { 2.0 } else { 4.0 } / samples.sample_rate_hz).sqrt()
+/// Sum of C/N0 (Hz) over the rays at the first sample.
+fn cn0_sum_hz(emitters: &mut [Box<dyn Emitter>]) -> Result<f64> {
+    let mut rays: Vec<Ray> = Vec::new();
+    for emitter in emitters {
+        // After the edges that are at the first sample.
+        emitter.rays(0.0, 1e-9, &mut rays)?;
+    }
+    Ok(rays.iter().map(|ray| ray.amplitude.powi(2)).sum())
 }
 
 impl SampleSource for Synthesiser {

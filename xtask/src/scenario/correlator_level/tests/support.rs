@@ -106,6 +106,7 @@ pub(super) fn reception(format: SampleFormat, rate_hz: f64, bandwidth: Option<f6
             swap_iq: false,
         },
         bandwidth_hz: bandwidth.map(|b| b * rate_hz),
+        bits: None,
         gain: Gain::Fixed,
     }
 }
