@@ -1,4 +1,9 @@
 //! GNSS-SDR, a receiver that nobody here wrote, on made-up signals: it takes them for real ones.
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "support of tests: a failure here is a failed test"
+)]
 
 use std::fs;
 use std::path::Path;

@@ -69,4 +69,35 @@ mod tests {
             assert!(!scenario.description.is_empty(), "{name}");
         }
     }
+
+    #[test]
+    fn impossible_scenarios_are_named_by_file_and_line() {
+        let message = |replaced: &str| {
+            let file = find("jiang2017-1").unwrap();
+            let file = file.with(&[replaced.to_owned()]).unwrap();
+            Scenario::new(&file, None).err().unwrap().to_string()
+        };
+        let absent = message("fault=[{kind=\"blocked\", sat=\"G05\", begin_s=3}]");
+        assert!(
+            absent.contains("line ") && absent.contains("G05"),
+            "{absent}"
+        );
+        let folded = message("front_end.if_hz=9e6");
+        assert!(
+            folded.contains("line ") && folded.contains("if_hz is 9000000"),
+            "{folded}"
+        );
+        let below = message("constellation.satellites=[7, 1]");
+        assert!(below.contains("G01 stands at -"), "{below}");
+        let unknown = message("constellation.satellites=[7, 32]");
+        assert!(unknown.contains("G32 has no orbit"), "{unknown}");
+        let nowhere = format!("{:#}", find("nowhere.toml").unwrap_err());
+        assert!(
+            nowhere.starts_with("scenario \"nowhere.toml\""),
+            "{nowhere}"
+        );
+        for text in [absent, folded, below, unknown, nowhere] {
+            assert!(!text.contains('\n'), "{text}");
+        }
+    }
 }

@@ -66,6 +66,8 @@ pub fn options(scenario: &Scenario) -> Table {
     set("if", samples.intermediate_frequency_hz.into());
     set("swap_iq", samples.swap_iq.into());
     set("truth", "truth.csv".into());
+    // Errors are computed from the files of a run.
+    set("out", "received".into());
     if scenario.propagation.ionosphere == IonosphereSpec::None {
         set("ionosphere", "none".into());
     }
@@ -174,5 +176,85 @@ impl Drop for Stage {
     fn drop(&mut self) {
         // Nothing can be done about a failure here; the error that led here is reported.
         let _ = fs::remove_dir_all(&self.folder);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scenario::catalogue;
+
+    fn scenario() -> Scenario {
+        let file = catalogue::find("jiang2017-1").unwrap();
+        let short = file.with(&["duration_s=0.02".to_owned()]).unwrap();
+        Scenario::new(&short, None).unwrap()
+    }
+
+    fn names(folder: &Path) -> Vec<String> {
+        let entries = fs::read_dir(folder).unwrap();
+        let name = |entry: io::Result<fs::DirEntry>| entry.unwrap().file_name();
+        let mut names: Vec<_> = entries
+            .map(|entry| name(entry).into_string().unwrap())
+            .collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn a_scenario_is_a_set_of_files_that_the_receiver_takes() {
+        let folder = tempfile::tempdir().unwrap();
+        make(&scenario(), Level::If, folder.path()).unwrap();
+        let expected = [
+            "faults.csv",
+            "navigation.rnx",
+            "receiver.toml",
+            "samples.bin",
+            "samples.bin.sigmf-meta",
+            "satellites.csv",
+            "truth.csv",
+        ];
+        assert_eq!(names(folder.path()), expected);
+        // Two bits a sample.
+        let length = fs::metadata(folder.path().join(SAMPLES_NAME))
+            .unwrap()
+            .len();
+        assert_eq!(length, (0.02 * 16.369e6 / 4.0f64).ceil() as u64);
+        let options = receiver::config::RunOptions::read(&folder.path().join("receiver.toml"));
+        let config = options.unwrap().check().unwrap();
+        assert_eq!(config.recording.samples, scenario().reception.samples);
+        assert!(config.position.is_some() && config.nav.is_some());
+        let sidecar = receiver::sigmf::read(&folder.path().join(SAMPLES_NAME)).unwrap();
+        assert_eq!(sidecar.format, Some(scenario().reception.samples.format));
+        assert_eq!(sidecar.intermediate_frequency_hz, Some(3.996e6));
+        let truth = receiver::truth::Truth::read(&folder.path().join("truth.csv")).unwrap();
+        let start = truth.at(0.0).unwrap();
+        assert!((start.velocity_ecef_mps.norm() - 1000.0).abs() < 1e-3);
+        let faults = fs::read_to_string(folder.path().join("faults.csv")).unwrap();
+        assert_eq!(faults.lines().last(), Some("blocked,G17,22,,0,"));
+    }
+
+    #[test]
+    fn the_same_scenario_gives_the_same_bytes() {
+        let (a, b) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        make(&scenario(), Level::If, a.path()).unwrap();
+        make(&scenario(), Level::If, b.path()).unwrap();
+        for name in names(a.path()) {
+            let read = |folder: &Path| fs::read(folder.join(&name)).unwrap();
+            assert!(read(a.path()) == read(b.path()), "{name}");
+        }
+    }
+
+    #[test]
+    fn what_fails_leaves_nothing() {
+        let folder = tempfile::tempdir().unwrap();
+        let in_the_way = folder.path().join("file");
+        fs::write(&in_the_way, "").unwrap();
+        let error = make(&scenario(), Level::If, &in_the_way.join("x")).unwrap_err();
+        assert!(error.to_string().contains("file/x"), "{error}");
+        let target = folder.path().join("out");
+        let stage = Stage::open(&target).unwrap();
+        truth_files::write(&scenario(), &stage.folder).unwrap();
+        drop(stage);
+        assert!(names(&target).is_empty());
     }
 }

@@ -152,3 +152,62 @@ fn quarter<F: Floats>(word: F::Words) -> (F, F) {
     let cosine = cosine * x2 - F::splat(0.5);
     (cosine * x2 + one, sine)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const NUMBERS: usize = 1 << 20;
+
+    fn planes(seed: u64, stream: u32) -> Planes {
+        let mut planes = Planes::default();
+        planes.clear(NUMBERS);
+        Noise::new(seed, stream).add(0, 1.0, &mut planes);
+        planes
+    }
+
+    fn mean(values: impl Iterator<Item = f64>) -> f64 {
+        values.sum::<f64>() / NUMBERS as f64
+    }
+
+    #[test]
+    fn numbers_are_normal_to_their_tails() {
+        let planes = planes(7, 0);
+        for plane in [&planes.i, &planes.q] {
+            let power = |n: i32| mean(plane.iter().map(|x| f64::from(*x).powi(n)));
+            // Four standard errors of a million numbers: 1, sqrt 2, sqrt 15 - ..., over 1000.
+            assert!(power(1).abs() < 4e-3);
+            assert!((power(2) - 1.0).abs() < 4.0 * 2f64.sqrt() / 1024.0);
+            assert!(power(3).abs() < 4.0 * 15f64.sqrt() / 1024.0);
+            assert!((power(4) - 3.0).abs() < 4.0 * 96f64.sqrt() / 1024.0);
+            for (beyond, share) in [(1.0, 0.317_310_5), (3.0, 2.699_796e-3), (4.5, 6.795_346e-6)] {
+                let count = plane.iter().filter(|x| f64::from(x.abs()) > beyond).count() as f64;
+                let expected = share * NUMBERS as f64;
+                assert!(
+                    (count - expected).abs() < 4.0 * expected.sqrt(),
+                    "{count} beyond {beyond}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn neighbours_components_and_streams_are_independent() {
+        let (one, other) = (planes(7, 0), planes(7, 1));
+        let product = |a: &[f32], b: &[f32]| {
+            let pairs = a.iter().zip(b);
+            mean(pairs.map(|(a, b)| f64::from(*a) * f64::from(*b)))
+        };
+        for correlation in [
+            product(&one.i, &one.q),
+            product(&one.i, &one.i[1..]),
+            product(&one.i, &one.i[8..]),
+            product(&one.i, &one.q[1..]),
+            product(&one.i, &other.i),
+            product(&one.i, &planes(8, 0).i),
+        ] {
+            // Four standard errors.
+            assert!(correlation.abs() < 4.0 / 1024.0, "{correlation}");
+        }
+    }
+}

@@ -177,8 +177,16 @@ fn lost_samples_leave_the_others_as_they_were() {
         begin_s: 1e-3,
         duration_s: 2.5e-3,
     };
-    let whole = bytes(scene(SampleFormat::Ci8, None, vec![]), Options::default(), 512);
-    let holed = bytes(scene(SampleFormat::Ci8, None, vec![gap]), Options::default(), 512);
+    let whole = bytes(
+        scene(SampleFormat::Ci8, None, vec![]),
+        Options::default(),
+        512,
+    );
+    let holed = bytes(
+        scene(SampleFormat::Ci8, None, vec![gap]),
+        Options::default(),
+        512,
+    );
     // Complex samples of two bytes; the length delivered stays.
     assert_eq!(holed.len(), whole.len());
     assert_eq!(holed[..8_000], whole[..8_000]);

@@ -119,7 +119,7 @@ struct Node {
     motion: Motion,
 }
 
-/// A curve through [nodes](Node): between two of them the cubic that has their positions and
+/// A curve through nodes: between two of them the cubic that has their positions and
 /// velocities, outside straight on.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trajectory {
