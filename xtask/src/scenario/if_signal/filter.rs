@@ -72,7 +72,7 @@ fn sinc(x: f64) -> f64 {
 
 /// The low-pass from two samples a tick to one: half its taps are zero.
 ///
-/// Flat to 0.425 of the sample rate; what lies beyond 0.575, and would fold into that, is 60 dB
+/// Flat to 0.425 of the sample rate; what lies beyond 0.575, and would fold into that, is 58 dB
 /// down; in between it falls to 6 dB at half the rate.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct HalfBand {
