@@ -40,7 +40,11 @@ fn all(criterion: &mut Criterion) -> Result<()> {
     let cases = [
         ("no noise, no filter, 8 bits", plain, ThermalNoise::Absent),
         ("noise, filter, 8 bits", "seed=1", ThermalNoise::White),
-        ("noise, filter, 1 bit", "front_end.format=c1_msb", ThermalNoise::White),
+        (
+            "noise, filter, 1 bit",
+            "front_end.format=c1_msb",
+            ThermalNoise::White,
+        ),
     ];
     let mut group = criterion.benchmark_group("synthesis");
     group.sample_size(20);
