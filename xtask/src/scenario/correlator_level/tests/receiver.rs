@@ -102,7 +102,7 @@ fn rms(squares: &[f64]) -> (f64, f64) {
     (mean.sqrt(), 0.5 * (variance / n / mean).sqrt())
 }
 
-/// Six short runs of each level; 120 runs of 2 s agreed to 0.3 standard errors of 4 %.
+/// Six short runs of each level.
 #[test]
 fn positions_err_as_on_samples() {
     let (mut drawn, mut sampled) = (Vec::new(), Vec::new());
@@ -119,4 +119,12 @@ fn positions_err_as_on_samples() {
         (a - b).abs() < 3.0 * error_a.hypot(error_b),
         "rms {a} m (standard error {error_a}) and {b} m ({error_b})"
     );
+}
+
+#[test]
+fn a_quantiser_that_is_not_modelled_is_refused() {
+    let mut scene = at_rest(1.0, 0).scene();
+    scene.reception.bits = Some(2);
+    let error = CorrelatorLevelBank::new(scene).err().unwrap().to_string();
+    assert!(error.starts_with("bits: "), "{error}");
 }
