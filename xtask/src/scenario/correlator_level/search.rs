@@ -7,8 +7,9 @@
 //! - Signal: at the cell of its strongest ray's Doppler and code phase, rounded to the grid, the
 //!   coherent sums of all blocks with bits, rays and code correlation (cut to the band searched)
 //!   as they are, each with its own noise: a noncentral chi-square.
-//! - Code phase by the same parabola as the engine's, so that reflections move it; code phase,
-//!   Doppler and C/N0 then err with the deviations that the engine shows on samples.
+//! - Code phase by the same parabola as the engine's, so that reflections move it. Code phase,
+//!   Doppler and C/N0 then err by rough deviations, not yet held against the engine on samples:
+//!   channels pull in from there, and their own noise is exact.
 //!
 //! Each signal is drawn by itself. What strong signals leave in other codes is not drawn; the rule
 //! that drops hits which may be that is applied.

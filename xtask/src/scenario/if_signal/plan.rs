@@ -74,7 +74,8 @@ impl Planner {
         })
     }
 
-    /// The runs of the next block, which ends with a whole byte or is the last; none at the end.
+    /// The runs of the next block; none at the end. It ends with a whole byte, is the last, or ends
+    /// with lost samples that are made: a gap of any length takes no more memory than a block.
     ///
     /// # Errors
     /// Where an emitter has no value.
@@ -83,7 +84,6 @@ impl Planner {
         if wanted == 0 {
             return Ok(None);
         }
-        self.left -= wanted;
         let mut runs = Vec::new();
         while wanted > 0 {
             let gap = self.gaps.iter().find(|(_, end)| *end > self.tick).copied();
@@ -92,13 +92,11 @@ impl Planner {
                     if self.makes_lost {
                         let samples = (end - self.tick).min(self.block);
                         runs.push(self.run(samples, false)?);
+                        self.tick += samples;
+                        return Ok(Some(runs));
                     }
                     // What is not made is passed over at once.
-                    self.tick = if self.makes_lost {
-                        self.tick + (end - self.tick).min(self.block)
-                    } else {
-                        end
-                    };
+                    self.tick = end;
                     continue;
                 }
                 Some((begin, _)) => wanted.min(begin - self.tick),
@@ -106,6 +104,7 @@ impl Planner {
             };
             runs.push(self.run(run, true)?);
             self.tick += run;
+            self.left -= run;
             wanted -= run;
         }
         Ok(Some(runs))

@@ -45,6 +45,8 @@ pub struct Synthesiser {
     supply: Supply,
     receiving: Arc<Receiving>,
     gain: GainControl,
+    /// Components that do not fill a byte yet.
+    components: Vec<f32>,
     bytes: Vec<u8>,
     taken: usize,
 }
@@ -111,31 +113,41 @@ impl Synthesiser {
             supply: Supply::new(planner, &receiving, threads.map_or(1, NonZeroUsize::get))?,
             receiving,
             gain,
+            components: Vec::new(),
             bytes: Vec::new(),
             taken: 0,
         })
     }
 
-    /// Gets the bytes of the next block; none at the end.
+    /// Gets the bytes of the next block that has any; none at the end.
     fn next_block(&mut self) -> Result<()> {
         self.bytes.clear();
         self.taken = 0;
-        // A block may be empty only at the end.
-        match self.supply.next()? {
-            Some(Made::Bytes(bytes)) => self.bytes = bytes,
-            Some(Made::Samples(runs)) => {
-                let mut components = Vec::new();
-                for (run, mut planes) in runs {
-                    self.receiving
-                        .finish(&mut self.gain, &run, &mut planes, &mut components);
+        while self.bytes.is_empty() {
+            match self.supply.next()? {
+                Some(Made::Bytes(bytes)) => self.bytes = bytes,
+                Some(Made::Samples(runs)) => self.level(runs),
+                None => {
+                    let rest = std::mem::take(&mut self.components);
+                    self.receiving.quantiser.append(&rest, &mut self.bytes);
+                    return Ok(());
                 }
-                self.receiving
-                    .quantiser
-                    .append(&components, &mut self.bytes);
             }
-            None => {}
         }
         Ok(())
+    }
+
+    /// Brings samples that waited for their gain to their level; whole bytes become bytes.
+    fn level(&mut self, runs: Vec<(Run, Planes)>) {
+        for (run, mut planes) in runs {
+            let components = &mut self.components;
+            self.receiving
+                .finish(&mut self.gain, &run, &mut planes, components);
+        }
+        // Eight components of any depth fill bytes.
+        let whole = self.components.len() / 8 * 8;
+        let full: Vec<f32> = self.components.drain(..whole).collect();
+        self.receiving.quantiser.append(&full, &mut self.bytes);
     }
 }
 

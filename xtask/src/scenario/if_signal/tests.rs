@@ -194,6 +194,37 @@ fn lost_samples_leave_the_others_as_they_were() {
 }
 
 #[test]
+fn a_level_that_follows_needs_no_whole_gap_in_memory_and_no_whole_bytes_before_it() {
+    // The gap begins after 4001 samples and is longer than a block.
+    let gap = Gap {
+        begin_s: 4001.0 / RATE_HZ,
+        duration_s: 13.3e-3,
+    };
+    let with = |format, threads, gaps| {
+        let mut scene = scene(format, Some(2e6), gaps);
+        scene.reception.gain = Gain::Automatic { time_s: 1e-3 };
+        let options = Options {
+            threads: NonZeroUsize::new(threads),
+            ..Options::default()
+        };
+        bytes(scene, options, 1000)
+    };
+    for (format, length, before) in [
+        (SampleFormat::C1Msb, 10_000, 1_000),
+        (SampleFormat::R2Lsb, 10_000, 1_000),
+        (SampleFormat::Ci8, 80_000, 8_002),
+    ] {
+        let holed = with(format, 1, vec![gap]);
+        assert_eq!(holed.len(), length, "{format}");
+        assert!(holed == with(format, 3, vec![gap]), "{format}");
+        assert!(
+            holed[..before] == with(format, 1, vec![])[..before],
+            "{format}"
+        );
+    }
+}
+
+#[test]
 fn threads_and_reads_of_any_size_give_the_same_bytes() {
     for (format, bandwidth_hz) in [
         (SampleFormat::Ci8, Some(3.2e6)),
