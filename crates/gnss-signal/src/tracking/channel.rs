@@ -6,6 +6,7 @@ use super::nco::Nco;
 use super::pull_in::{PullInEstimate, Stretch};
 use super::sample_grid::code_error_correction_chips;
 use super::steady::Steady;
+use super::steered::Steering;
 use super::{Lock, NoiseFloor, TrackingSettings, cn0};
 use crate::{AcquisitionHit, FrontEnd, Replica, SignalId, TapOffsets, Taps};
 
@@ -107,6 +108,62 @@ impl Channel {
         }
     }
 
+    /// A channel on a signal that navigation predicts, steered by it: no acquisition, no pull-in.
+    ///
+    /// `periods_into_bit` code periods of a data bit are over at the steering's tick.
+    #[must_use]
+    pub fn predicted(
+        signal: SignalId,
+        front_end: FrontEnd,
+        settings: TrackingSettings,
+        steering: &Steering,
+        periods_into_bit: u8,
+    ) -> Self {
+        let nco = Nco {
+            signal,
+            front_end,
+            spectrum: settings.spectrum,
+            tick: steering.tick,
+            code_period: 0,
+            code_phase_chips: steering.code_phase_chips,
+            carrier_phase_cycles: 0.0,
+            doppler_cycles: 0.0,
+            doppler_hz: settings.spectrum.sign() * steering.doppler_hz,
+            code_slip_hz: 0.0,
+        };
+        let mut steady = Steady::predicted(nco, settings, periods_into_bit);
+        steady.steer(steering);
+        Self {
+            settings,
+            stage: Stage::Steady(Box::new(steady)),
+        }
+    }
+
+    /// Lets navigation steer; the channel then measures against its oscillators and no longer
+    /// loses its signal. Does nothing before the bit boundaries are known, or once it is lost;
+    /// returns whether it does anything.
+    pub fn steer(&mut self, steering: &Steering) -> bool {
+        let Stage::Steady(steady) = &mut self.stage else {
+            return false;
+        };
+        steady.steer(steering);
+        true
+    }
+
+    /// Gives the oscillators back to the channel's own loops, the code phase known to
+    /// `code_variance_chips2`.
+    pub fn release(&mut self, code_variance_chips2: f64) {
+        if let Stage::Steady(steady) = &mut self.stage {
+            steady.release(code_variance_chips2);
+        }
+    }
+
+    /// Whether navigation steers.
+    #[must_use]
+    pub fn is_steered(&self) -> bool {
+        matches!(&self.stage, Stage::Steady(s) if s.is_steered())
+    }
+
     /// The signal.
     #[must_use]
     pub fn signal(&self) -> SignalId {
@@ -192,7 +249,8 @@ impl Channel {
             }
             Stage::Steady(s) => {
                 let bit = s.update(&sums, variance, replica);
-                if s.lock() == Lock::Lost {
+                // Navigation steers on where a signal is gone, so that it is there on its return.
+                if s.lock() == Lock::Lost && !s.is_steered() {
                     self.stage = Stage::Lost(s.nco.signal, s.nco.doppler_hz);
                 }
                 ChannelUpdate {

@@ -18,11 +18,12 @@ pub struct ChannelEpoch {
     pub code_phase_chips: f64,
     /// Code periods since the present data bit began, where bit boundaries are known.
     pub periods_into_bit: Option<u8>,
-    /// Variance of the code phase, chips^2.
+    /// Variance of the code phase, chips^2; infinite where a steered channel measured nothing since
+    /// the previous epoch.
     pub code_variance_chips2: f64,
     /// Doppler, Hz, above zero when approaching (whichever way the spectrum runs).
     pub doppler_hz: f64,
-    /// Its variance, Hz^2.
+    /// Its variance, Hz^2; infinite where a steered channel measured none.
     pub doppler_variance_hz2: f64,
     /// Integral of the Doppler since the channel's start, cycles.
     pub doppler_cycles: f64,
@@ -38,6 +39,33 @@ pub struct ChannelEpoch {
     pub code_error_chips: f64,
     /// Mean frequency error of the epoch's integrations, Hz.
     pub frequency_error_hz: f64,
+}
+
+/// What the integrations of an epoch say together.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct EpochValues {
+    /// Code phase measured minus that of the oscillator, chips.
+    pub(super) code_shift_chips: f64,
+    pub(super) code_error_chips: f64,
+    pub(super) code_variance_chips2: f64,
+    pub(super) frequency_error_hz: f64,
+    /// Apparent Doppler, Hz.
+    pub(super) doppler_hz: f64,
+    pub(super) doppler_variance_hz2: f64,
+}
+
+impl EpochValues {
+    /// Nothing was measured; the oscillator has that Doppler.
+    pub(super) const fn nothing(doppler_hz: f64) -> Self {
+        Self {
+            code_shift_chips: 0.0,
+            code_error_chips: 0.0,
+            code_variance_chips2: f64::INFINITY,
+            frequency_error_hz: 0.0,
+            doppler_hz,
+            doppler_variance_hz2: f64::INFINITY,
+        }
+    }
 }
 
 /// One integration as the pre-filter takes it.

@@ -53,6 +53,12 @@ impl LockDetector {
         }
     }
 
+    /// Takes carrier lock for lost.
+    pub(super) const fn unlock(&mut self) {
+        self.cosine = 0.0;
+        self.carrier = false;
+    }
+
     /// Takes one prompt sum, and the smoothed C/N0 against its limit.
     pub(super) fn update(
         &mut self,

@@ -14,9 +14,11 @@ mod settings;
 #[cfg(test)]
 mod simulated;
 mod steady;
+mod steered;
 
 pub use channel::{BitSync, Channel, ChannelUpdate, NavBit};
 pub use epoch::ChannelEpoch;
 pub use lock::Lock;
 pub use noise::NoiseFloor;
 pub use settings::{Spectrum, TrackingSettings};
+pub use steered::{FrequencyPairs, SteeredSettings, Steering};

@@ -2,6 +2,7 @@
 
 use super::discriminator::CodeDiscriminator;
 use super::loop_filter::{CarrierBandwidth, LoopOrder};
+use super::steered::SteeredSettings;
 use crate::SignalError;
 
 /// Which way the front end maps the spectrum.
@@ -56,6 +57,8 @@ pub struct TrackingSettings {
     pub patience_s: f64,
     /// Longest stretch pulled in at once, code periods. Default 1000.
     pub longest_pull_in_periods: u32,
+    /// Measurements while navigation steers.
+    pub steered: SteeredSettings,
 }
 
 impl Default for TrackingSettings {
@@ -79,6 +82,7 @@ impl Default for TrackingSettings {
             lowest_cn0_dbhz: 22.0,
             patience_s: 1.0,
             longest_pull_in_periods: 1000,
+            steered: SteeredSettings::default(),
         }
     }
 }
@@ -100,6 +104,15 @@ impl TrackingSettings {
         if ![1, 2, 4, 5, 10, 20].contains(&self.integration_periods) {
             let value = self.integration_periods.to_string();
             return refuse("integration (code periods)", value, "1, 2, 4, 5, 10 or 20");
+        }
+        let interval = self.steered.interval_periods;
+        let least = self.steered.integration_periods(self.integration_periods);
+        if ![1, 2, 4, 5, 10, 20].contains(&interval) || least == 0 || interval % least != 0 {
+            return refuse(
+                "measuring interval under navigation (code periods)",
+                interval.to_string(),
+                "a part of 20, a multiple of the integration, at least 2 where halves are compared",
+            );
         }
         if !(positive(self.spacing_chips) && self.spacing_chips <= 1.0) {
             let value = self.spacing_chips.to_string();

@@ -1,14 +1,18 @@
 //! Steady tracking of a signal whose bit boundaries are known: loops, lock, bits, pre-filter.
+//!
+//! The code oscillator follows the channel's own loop, or navigation. The carrier loop is the channel's
+//! own either way; under navigation it starts from navigation's Doppler and is held to it.
 
 use num_complex::Complex64;
 
 use super::cn0;
 use super::discriminator::{EarlyPromptLate, FrequencyDiscriminator, PhaseDiscriminator};
-use super::epoch::{ChannelEpoch, Integration, PhaseLine, PreFilter};
+use super::epoch::{ChannelEpoch, EpochValues, Integration, PhaseLine, PreFilter};
 use super::lock::LockDetector;
-use super::loop_filter::{CarrierLoop, CodeLoop};
+use super::loop_filter::{CarrierBandwidth, CarrierLoop, CodeLoop};
 use super::nco::Nco;
 use super::sample_grid::{code_error_correction_chips, shift_chips};
+use super::steered::{Measured, Reception, Steered, SteeredSums, Steering};
 use super::{Lock, NavBit, TrackingSettings};
 use crate::Replica;
 
@@ -23,7 +27,21 @@ const STRONG_SNR: f64 = 20.0;
 /// Deviation of the code phase when carrier lock is lost, chips.
 const UNLOCKED_SIGMA_CHIPS: f64 = 0.05;
 
-/// A signal tracked by its own loops.
+/// C/N0 from which a steered channel tracks the carrier phase, Hz (25 dB-Hz): a loop of 10 Hz slips
+/// below it.
+const PHASE_CN0_HZ: f64 = 316.0;
+/// A carrier loop this far from navigation's Doppler follows something else, Hz: it locks falsely at
+/// multiples of half the rate of integrations, and 1 g gives 1 Hz between two steerings.
+const FALSE_LOCK_HZ: f64 = 10.0;
+
+/// Who steers the code oscillator.
+#[derive(Debug, Clone)]
+enum Helm {
+    Own(CodeLoop),
+    Navigation(Box<Steered>),
+}
+
+/// A signal whose bit boundaries are known.
 #[derive(Debug, Clone)]
 pub(super) struct Steady {
     pub(super) nco: Nco,
@@ -31,7 +49,7 @@ pub(super) struct Steady {
     /// First period that begins a bit, modulo the periods of a bit.
     bit_edge: i64,
     carrier: CarrierLoop,
-    code: CodeLoop,
+    helm: Helm,
     detector: LockDetector,
     lock: Lock,
     cn0_hz: f64,
@@ -59,7 +77,13 @@ struct Bit {
 struct Fade {
     since_tick: u64,
     integrations: u32,
+    /// Sum of their C/N0, Hz.
+    cn0_hz: f64,
 }
+
+/// After so many the smoothed C/N0 is theirs: it would take seconds to fall that far. By chance so
+/// many happen once in 1e11.
+const FADE_IS_REAL: u32 = 5;
 
 impl Steady {
     /// Tracking from `nco`, on a signal of `cn0_hz` whose code phase has that variance.
@@ -75,7 +99,7 @@ impl Steady {
             settings,
             bit_edge: nco.nearest_period().rem_euclid(bit_periods),
             carrier: CarrierLoop::new(settings.carrier_order, nco.doppler_hz),
-            code: CodeLoop::new(code_variance_chips2),
+            helm: Helm::Own(CodeLoop::new(code_variance_chips2)),
             detector: LockDetector::new(false),
             lock: Lock::Code,
             cn0_hz,
@@ -91,8 +115,68 @@ impl Steady {
         }
     }
 
+    /// Tracking of a signal that navigation predicts, `periods_into_bit` code periods after the
+    /// beginning of a bit.
+    pub(super) fn predicted(
+        mut nco: Nco,
+        settings: TrackingSettings,
+        periods_into_bit: u8,
+    ) -> Self {
+        let bit_periods = bit_periods(&nco);
+        let bit_edge = nco.code_period - i64::from(periods_into_bit);
+        // Periods are counted from a bit's beginning, and never below zero.
+        nco.code_period += bit_periods;
+        let weakest = cn0::ratio_hz(settings.lowest_cn0_dbhz);
+        Self {
+            bit_edge: bit_edge.rem_euclid(bit_periods),
+            helm: Helm::Navigation(Box::default()),
+            ..Self::new(nco, settings, weakest, 1.0)
+        }
+    }
+
     pub(super) const fn lock(&self) -> Lock {
         self.lock
+    }
+
+    pub(super) const fn is_steered(&self) -> bool {
+        matches!(self.helm, Helm::Navigation(_))
+    }
+
+    /// Puts the oscillators where navigation says, from the next integration on.
+    pub(super) fn steer(&mut self, steering: &Steering) {
+        let apparent_hz = self.nco.spectrum.sign() * steering.doppler_hz;
+        let astray = (self.nco.doppler_hz - apparent_hz).abs() > FALSE_LOCK_HZ;
+        if self.lock != Lock::Carrier || astray {
+            self.carrier = CarrierLoop::new(self.settings.carrier_order, apparent_hz);
+            self.nco.doppler_hz = apparent_hz;
+        }
+        if astray {
+            self.detector.unlock();
+        }
+        self.nco.code_slip_hz = 0.0;
+        self.nco.code_slip_hz = steering.code_rate_hz - self.nco.code_rate_hz();
+        let since_s =
+            (self.nco.tick as f64 - steering.tick as f64) / self.nco.front_end.sample_rate_hz;
+        let wanted = steering.code_phase_chips + steering.code_rate_hz * since_s;
+        let half = self.nco.code_length_chips() / 2.0;
+        let error = wanted - self.nco.code_phase_chips;
+        let shift = (error + half).rem_euclid(2.0 * half) - half;
+        self.nco.shift_code(shift);
+        if let Helm::Own(_) = self.helm {
+            self.helm = Helm::Navigation(Box::default());
+            self.pre_filter.clear();
+        }
+        if let Helm::Navigation(steered) = &mut self.helm {
+            steered.shifted(shift);
+        }
+    }
+
+    /// Gives the oscillators back to the channel's own loops, the code known to `variance_chips2`.
+    pub(super) fn release(&mut self, variance_chips2: f64) {
+        if self.is_steered() {
+            self.helm = Helm::Own(CodeLoop::new(variance_chips2));
+            self.nco.code_slip_hz = 0.0;
+        }
     }
 
     /// Whether the signal stands well out of the noise of one integration.
@@ -107,7 +191,7 @@ impl Steady {
 
     /// Next interval: up to a bit boundary or a whole integration after one.
     pub(super) fn replica(&self) -> Replica {
-        let length = i64::from(self.settings.integration_periods);
+        let length = i64::from(self.integration_periods());
         let now = self.nco.nearest_period();
         let end = now + length - (now - self.bit_edge).rem_euclid(length);
         let spacing = self.settings.spacing_chips;
@@ -131,23 +215,81 @@ impl Steady {
         let interval_s = (end_tick - start.tick) as f64 / start.front_end.sample_rate_hz;
         self.watch_power(taps.prompt, noise_variance, interval_s, start.tick);
         self.prompt = taps.prompt / noise_variance.sqrt();
-        let phase_error = PhaseDiscriminator::Costas.error_cycles(taps.prompt);
-        let frequency_error = self.frequency_error_hz(taps.prompt, interval_s);
-        let code_error = self
-            .settings
-            .code_discriminator
-            .error_chips(taps, self.settings.spacing_chips)
-            + shift_chips(self.turn, replica, start.front_end.sample_rate_hz)
+        let offset = shift_chips(self.turn, replica, start.front_end.sample_rate_hz)
             + code_error_correction_chips(replica, start.front_end.sample_rate_hz);
         self.turn = self.turn.wrapping_add(1);
-        self.pre_filter.push(Integration {
-            middle_s: (start.tick + end_tick) as f64 / 2.0 / start.front_end.sample_rate_hz,
-            phase_cycles: start.doppler_cycles + start.doppler_hz * interval_s / 2.0 + phase_error,
-            code_error_chips: code_error,
-            frequency_error_hz: frequency_error,
-        });
-        self.steer(phase_error, frequency_error, code_error, interval_s);
-        self.sum_bit(taps.prompt)
+        let periods = self.nco.nearest_period() - start.nearest_period();
+        let phase_error = PhaseDiscriminator::Costas.error_cycles(taps.prompt);
+        let middle_s = (start.tick + end_tick) as f64 / 2.0 / start.front_end.sample_rate_hz;
+        let cycles = start.doppler_cycles + start.doppler_hz * interval_s / 2.0;
+        if self.is_steered() {
+            let sums = SteeredSums {
+                taps: *taps,
+                noise_variance,
+                periods,
+                start_period: start.nearest_period() - self.bit_edge,
+                middle_s,
+                cycles,
+                code_offset_chips: offset,
+            };
+            self.take_steered(&sums);
+            self.follow_phase(phase_error, interval_s);
+        } else {
+            let code_error = self
+                .settings
+                .code_discriminator
+                .error_chips(taps, self.settings.spacing_chips)
+                + offset;
+            let frequency_error = self.frequency_error_hz(taps.prompt, interval_s);
+            self.pre_filter.push(Integration {
+                middle_s,
+                phase_cycles: cycles + phase_error,
+                code_error_chips: code_error,
+                frequency_error_hz: frequency_error,
+            });
+            self.steer_by_loops(phase_error, frequency_error, code_error, interval_s);
+        }
+        self.sum_bit(taps.prompt, periods)
+    }
+
+    /// Adds the sums of an integration to what the steered channel measures.
+    fn take_steered(&mut self, sums: &SteeredSums) {
+        let reception = self.reception();
+        let settings = self.settings.steered;
+        let Helm::Navigation(steered) = &mut self.helm else {
+            return;
+        };
+        if let Some(measured) = steered.push(sums, &settings, &reception) {
+            let interval_s = f64::from(settings.interval_periods) * reception.period_s;
+            let Measured {
+                prompt,
+                noise_variance,
+                ..
+            } = measured;
+            let now = cn0::against_noise_floor(prompt, noise_variance, interval_s);
+            self.cn0_hz += (interval_s / CN0_TIME_S).min(1.0) * (now - self.cn0_hz);
+        }
+    }
+
+    /// Tracks the carrier phase beside navigation's Doppler, where the signal allows.
+    fn follow_phase(&mut self, phase_cycles: f64, interval_s: f64) {
+        if self.settings.steered.carrier_phase && self.cn0_hz > PHASE_CN0_HZ {
+            let bandwidth = CarrierBandwidth {
+                frequency_hz: 0.0,
+                ..self.settings.locked_bandwidth
+            };
+            self.nco.doppler_hz = self
+                .carrier
+                .update(phase_cycles, 0.0, bandwidth, interval_s);
+        }
+    }
+
+    fn reception(&self) -> Reception {
+        Reception {
+            cn0_hz: self.cn0_hz,
+            spacing_chips: self.settings.spacing_chips,
+            period_s: self.nco.signal.spec().code_period_s(),
+        }
     }
 
     fn watch_power(&mut self, prompt: Complex64, noise: f64, interval_s: f64, tick: u64) {
@@ -159,13 +301,20 @@ impl Steady {
             (true, 0) => Fade {
                 since_tick: tick,
                 integrations: 1,
+                cn0_hz: now,
             },
             (true, n) => Fade {
                 integrations: n + 1,
+                cn0_hz: self.fade.cn0_hz + now,
                 ..self.fade
             },
         };
-        self.cn0_hz += (interval_s / CN0_TIME_S).min(1.0) * (now - self.cn0_hz);
+        if self.is_steered() && self.fade.integrations == FADE_IS_REAL {
+            self.cn0_hz = (self.fade.cn0_hz / f64::from(FADE_IS_REAL)).max(0.0);
+        }
+        if !self.is_steered() {
+            self.cn0_hz += (interval_s / CN0_TIME_S).min(1.0) * (now - self.cn0_hz);
+        }
         let limit = cn0::ratio_hz(self.settings.lowest_cn0_dbhz);
         let strong_enough = self.cn0_hz > limit;
         let patience_s = self.settings.patience_s;
@@ -174,8 +323,11 @@ impl Steady {
             .detector
             .update(prompt, strong_enough, interval_s, patience_s);
         self.slipped |= self.lock != Lock::Carrier;
-        if before == Lock::Carrier && self.lock != Lock::Carrier {
-            self.code.widen(UNLOCKED_SIGMA_CHIPS * UNLOCKED_SIGMA_CHIPS);
+        if before == Lock::Carrier
+            && self.lock != Lock::Carrier
+            && let Helm::Own(code) = &mut self.helm
+        {
+            code.widen(UNLOCKED_SIGMA_CHIPS * UNLOCKED_SIGMA_CHIPS);
         }
     }
 
@@ -186,7 +338,13 @@ impl Steady {
         })
     }
 
-    fn steer(&mut self, phase_cycles: f64, frequency_hz: f64, code_chips: f64, interval_s: f64) {
+    fn steer_by_loops(
+        &mut self,
+        phase_cycles: f64,
+        frequency_hz: f64,
+        code_chips: f64,
+        interval_s: f64,
+    ) {
         let s = &self.settings;
         let (carrier, code_hz) = if self.lock == Lock::Carrier {
             (s.locked_bandwidth, s.code_locked_hz)
@@ -197,16 +355,18 @@ impl Steady {
             .carrier
             .update(phase_cycles, frequency_hz, carrier, interval_s);
         let variance = self.code_error_variance_chips2();
-        let correction = self.code.update(code_chips, variance, code_hz, interval_s);
-        self.nco.code_slip_hz = self.code.slip_hz();
-        self.nco.shift_code(correction);
+        if let Helm::Own(code) = &mut self.helm {
+            let correction = code.update(code_chips, variance, code_hz, interval_s);
+            self.nco.code_slip_hz = code.slip_hz();
+            self.nco.shift_code(correction);
+        }
     }
 
     /// Adds to the bit and returns it where it is complete.
-    fn sum_bit(&mut self, prompt: Complex64) -> Option<NavBit> {
+    fn sum_bit(&mut self, prompt: Complex64, periods: i64) -> Option<NavBit> {
         let bit_periods = bit_periods(&self.nco);
         self.bit.sum += prompt;
-        self.bit.periods += i64::from(self.settings.integration_periods);
+        self.bit.periods += periods;
         let now = self.nco.nearest_period();
         if (now - self.bit_edge).rem_euclid(bit_periods) != 0 {
             return None;
@@ -222,8 +382,8 @@ impl Steady {
     pub(super) fn epoch(&mut self, tick: u64) -> ChannelEpoch {
         let mut at = self.nco;
         at.advance_to(tick);
-        let (code_error_chips, frequency_error_hz) = self.pre_filter.mean_errors();
-        let (doppler_hz, doppler_variance_hz2) = self.doppler(tick, frequency_error_hz);
+        let measured = self.measured(tick);
+        at.shift_code(measured.code_shift_chips);
         let sign = at.spectrum.sign();
         let epoch = ChannelEpoch {
             signal: at.signal,
@@ -233,19 +393,69 @@ impl Steady {
             periods_into_bit: Some(
                 (at.code_period - self.bit_edge).rem_euclid(bit_periods(&at)) as u8,
             ),
-            code_variance_chips2: self.code.variance_chips2(),
-            doppler_hz: sign * doppler_hz,
-            doppler_variance_hz2,
+            code_variance_chips2: measured.code_variance_chips2,
+            doppler_hz: sign * measured.doppler_hz,
+            doppler_variance_hz2: measured.doppler_variance_hz2,
             doppler_cycles: sign * at.doppler_cycles,
             phase_slipped: std::mem::replace(&mut self.slipped, self.lock != Lock::Carrier),
             cn0_dbhz: cn0::dbhz(self.cn0_hz),
             lock: self.lock,
             prompt: self.prompt,
-            code_error_chips,
-            frequency_error_hz,
+            code_error_chips: measured.code_error_chips,
+            frequency_error_hz: measured.frequency_error_hz,
         };
         self.pre_filter.clear();
+        if let Helm::Navigation(steered) = &mut self.helm {
+            steered.clear();
+        }
         epoch
+    }
+
+    /// What the integrations since the previous epoch say of `tick`.
+    fn measured(&mut self, tick: u64) -> EpochValues {
+        match &self.helm {
+            Helm::Own(code) => {
+                let code_variance_chips2 = code.variance_chips2();
+                let (code_error_chips, frequency_error_hz) = self.pre_filter.mean_errors();
+                let (doppler_hz, doppler_variance_hz2) = self.doppler(tick, frequency_error_hz);
+                EpochValues {
+                    // The oscillator itself has smoothed the errors.
+                    code_shift_chips: 0.0,
+                    code_error_chips,
+                    code_variance_chips2,
+                    frequency_error_hz,
+                    doppler_hz,
+                    doppler_variance_hz2,
+                }
+            }
+            Helm::Navigation(steered) => {
+                let values = steered.values(&self.settings.steered, &self.reception());
+                let values = values.unwrap_or(EpochValues::nothing(self.nco.doppler_hz));
+                if self.lock != Lock::Carrier {
+                    return values;
+                }
+                let (doppler_hz, doppler_variance_hz2) = self.oscillator_doppler(tick);
+                EpochValues {
+                    doppler_hz,
+                    doppler_variance_hz2,
+                    ..values
+                }
+            }
+        }
+    }
+
+    /// Doppler of a locked carrier oscillator at `tick`, Hz, and its variance, Hz^2.
+    fn oscillator_doppler(&self, tick: u64) -> (f64, f64) {
+        let interval_s = self.interval_s();
+        let middle_s = interval_s / 2.0;
+        let ahead_s = tick.saturating_sub(self.nco.tick) as f64 / self.nco.front_end.sample_rate_hz;
+        let doppler_hz = self.nco.doppler_hz + self.carrier.rate_hz_s() * (ahead_s - middle_s);
+        let phase = costas_variance_cycles2(self.snr(interval_s));
+        let bandwidth = self.settings.locked_bandwidth;
+        let variance = self
+            .carrier
+            .frequency_variance_hz2(phase, bandwidth, interval_s);
+        (doppler_hz, variance)
     }
 
     /// Doppler at `tick`, Hz, and its variance, Hz^2: the slope of the phase where it is locked.
@@ -267,14 +477,22 @@ impl Steady {
             self.acceleration_hz_s += ACCELERATION_GAIN * (slope - self.acceleration_hz_s);
         }
         let ahead_s = tick as f64 / self.nco.front_end.sample_rate_hz - line.middle_s;
-        // Costas phase variance, cycles^2 (Kaplan2017, 8.80 per integration).
-        let phase = (1.0 + 0.5 / snr) / (2.0 * snr) / std::f64::consts::TAU.powi(2);
+        let phase = costas_variance_cycles2(snr);
         let doppler_hz = line.slope_hz + self.acceleration_hz_s * ahead_s;
         (doppler_hz, phase / line.spread_s2)
     }
 
     fn interval_s(&self) -> f64 {
-        f64::from(self.settings.integration_periods) * self.nco.signal.spec().code_period_s()
+        f64::from(self.integration_periods()) * self.nco.signal.spec().code_period_s()
+    }
+
+    fn integration_periods(&self) -> u32 {
+        let own = self.settings.integration_periods;
+        if self.is_steered() {
+            self.settings.steered.integration_periods(own)
+        } else {
+            own
+        }
     }
 
     fn snr(&self, interval_s: f64) -> f64 {
@@ -288,6 +506,11 @@ impl Steady {
         let snr = self.snr(self.interval_s());
         spacing / (4.0 * snr) * (1.0 + 2.0 / ((2.0 - spacing) * snr))
     }
+}
+
+/// Variance of the phase of one integration (Kaplan2017, 8.80), cycles^2.
+fn costas_variance_cycles2(snr: f64) -> f64 {
+    (1.0 + 0.5 / snr) / (2.0 * snr) / std::f64::consts::TAU.powi(2)
 }
 
 /// A code phase brought into [0, code length), chips.

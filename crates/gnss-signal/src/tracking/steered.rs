@@ -1,0 +1,505 @@
+//! What a channel steered by navigation measures: code phase and Doppler, interval by interval.
+//!
+//! An interval is a data bit or a whole part of one, and has two halves. The code error comes from
+//! its coherent sums, the frequency error from the phase between its halves: nothing is shared
+//! between intervals, so that errors stay white, and no bit edge falls between the halves, so that
+//! the sign of the bit does not matter.
+
+use std::f64::consts::TAU;
+
+use num_complex::Complex64;
+
+use super::discriminator::{CodeDiscriminator, EarlyPromptLate, FrequencyDiscriminator};
+use super::epoch::EpochValues;
+
+/// Where navigation puts the oscillators of a channel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Steering {
+    /// Tick at which all of it holds.
+    pub tick: u64,
+    /// Code phase, chips, in [0, code length).
+    pub code_phase_chips: f64,
+    /// Code rate, chips/s.
+    pub code_rate_hz: f64,
+    /// Doppler, Hz; above zero when approaching (whichever way the spectrum runs).
+    pub doppler_hz: f64,
+}
+
+/// Which sums a frequency error is formed of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FrequencyPairs {
+    /// The two halves of an interval, by their angle: bounded, and white from interval to interval.
+    Halves,
+    /// Each interval and the one before, by equation (6) of Jiang2017: unbounded where the signal
+    /// is gone, and successive errors share a sum.
+    Successive,
+}
+
+/// How a steered channel measures.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SteeredSettings {
+    /// Length of an interval, code periods (2, 4, 10 or 20; with successive pairs 1, 5 too).
+    /// Default 20: a data bit.
+    pub interval_periods: u32,
+    /// How a frequency error is formed. Default: halves.
+    pub pairs: FrequencyPairs,
+    /// Whether the carrier phase is tracked where the signal allows, beside navigation's Doppler.
+    /// Default: it is.
+    pub carrier_phase: bool,
+}
+
+impl Default for SteeredSettings {
+    fn default() -> Self {
+        Self {
+            interval_periods: 20,
+            pairs: FrequencyPairs::Halves,
+            carrier_phase: true,
+        }
+    }
+}
+
+impl SteeredSettings {
+    /// Integration of a steered channel whose own loops integrate over `own_periods`: no more than a
+    /// half where halves are compared.
+    pub(super) fn integration_periods(&self, own_periods: u32) -> u32 {
+        match self.pairs {
+            FrequencyPairs::Halves => own_periods.min(self.interval_periods / 2),
+            FrequencyPairs::Successive => own_periods.min(self.interval_periods),
+        }
+    }
+}
+
+/// Ratio of signal to noise of an interval below which its own power does not normalise errors:
+/// it would be mostly noise.
+const WEAK_SNR: f64 = 4.0;
+/// No signal further away than this reaches the early or late tap, chips.
+const LARGEST_CHIPS: f64 = 1.5;
+/// C/N0 below which signals are not told apart, Hz (8 dB-Hz): its estimate is noise.
+const LOWEST_CN0_HZ: f64 = 6.0;
+
+/// One integration as an interval takes it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct SteeredSums {
+    pub(super) taps: EarlyPromptLate,
+    /// Variance of a sum under noise alone.
+    pub(super) noise_variance: f64,
+    /// Code periods summed, and how many lie between the beginning of a bit and them.
+    pub(super) periods: i64,
+    pub(super) start_period: i64,
+    /// Middle, s on the channel's clock, and the oscillator's Doppler cycles there.
+    pub(super) middle_s: f64,
+    pub(super) cycles: f64,
+    /// Code error that the sums do not show, chips: what the sample grid does.
+    pub(super) code_offset_chips: f64,
+}
+
+/// Weighted sums of a part of an interval.
+#[derive(Debug, Clone, Copy, Default)]
+struct Part {
+    early: Complex64,
+    prompt: Complex64,
+    late: Complex64,
+    noise_variance: f64,
+    periods: i64,
+    middle_s: f64,
+    cycles: f64,
+    code_offset_chips: f64,
+    shifted_chips: f64,
+}
+
+impl Part {
+    fn add(&mut self, sums: &SteeredSums, shifted_chips: f64) {
+        let weight = sums.periods as f64;
+        self.early += sums.taps.early;
+        self.prompt += sums.taps.prompt;
+        self.late += sums.taps.late;
+        self.noise_variance += sums.noise_variance;
+        self.periods += sums.periods;
+        self.middle_s += weight * sums.middle_s;
+        self.cycles += weight * sums.cycles;
+        self.code_offset_chips += weight * sums.code_offset_chips;
+        self.shifted_chips += weight * shifted_chips;
+    }
+
+    fn joined(&self, other: &Self) -> Self {
+        Self {
+            early: self.early + other.early,
+            prompt: self.prompt + other.prompt,
+            late: self.late + other.late,
+            noise_variance: self.noise_variance + other.noise_variance,
+            periods: self.periods + other.periods,
+            middle_s: self.middle_s + other.middle_s,
+            cycles: self.cycles + other.cycles,
+            code_offset_chips: self.code_offset_chips + other.code_offset_chips,
+            shifted_chips: self.shifted_chips + other.shifted_chips,
+        }
+    }
+
+    fn mean(&self, total: f64) -> f64 {
+        total / self.periods as f64
+    }
+}
+
+/// What one interval measured.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Measured {
+    /// Prompt sum over the interval and its variance under noise alone.
+    pub(super) prompt: Complex64,
+    pub(super) noise_variance: f64,
+    /// Code error against the oscillator as it ran, chips.
+    code_error_chips: f64,
+    /// Shifts of the oscillator until then, chips.
+    shifted_chips: f64,
+    /// Frequency error against the oscillator, Hz, and apparent Doppler, Hz; `None` without a pair.
+    frequency: Option<Frequency>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Frequency {
+    error_hz: f64,
+    doppler_hz: f64,
+}
+
+/// The interval being summed.
+#[derive(Debug, Clone, Copy, Default)]
+struct Interval {
+    first: Part,
+    second: Part,
+    previous: Option<Part>,
+}
+
+/// What the sums of a signal are worth: its C/N0, and the spacing of its taps.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Reception {
+    pub(super) cn0_hz: f64,
+    pub(super) spacing_chips: f64,
+    pub(super) period_s: f64,
+}
+
+impl Interval {
+    /// Adds an integration; returns the two halves of the interval where it is complete.
+    fn push(&mut self, sums: &SteeredSums, shifted_chips: f64, length: i64) -> Option<[Part; 2]> {
+        let before = sums.start_period.rem_euclid(length);
+        let part = if 2 * before < length {
+            &mut self.first
+        } else {
+            &mut self.second
+        };
+        part.add(sums, shifted_chips);
+        if before + sums.periods < length {
+            return None;
+        }
+        let halves = [
+            std::mem::take(&mut self.first),
+            std::mem::take(&mut self.second),
+        ];
+        let whole = halves[0].periods + halves[1].periods == length;
+        if !whole {
+            self.previous = None;
+        }
+        whole.then_some(halves)
+    }
+}
+
+/// What a channel keeps while navigation steers it.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Steered {
+    shifted_chips: f64,
+    interval: Interval,
+    /// Since the previous epoch.
+    measured: Vec<Measured>,
+}
+
+impl Steered {
+    /// The code oscillator was shifted.
+    pub(super) fn shifted(&mut self, chips: f64) {
+        self.shifted_chips += chips;
+    }
+
+    /// Takes an integration; returns what its interval measured where it is complete.
+    pub(super) fn push(
+        &mut self,
+        sums: &SteeredSums,
+        settings: &SteeredSettings,
+        reception: &Reception,
+    ) -> Option<Measured> {
+        let length = i64::from(settings.interval_periods);
+        let [first, second] = self.interval.push(sums, self.shifted_chips, length)?;
+        let whole = first.joined(&second);
+        let pair = match settings.pairs {
+            FrequencyPairs::Halves => Some((first, second)),
+            FrequencyPairs::Successive => self.interval.previous.map(|before| (before, whole)),
+        };
+        self.interval.previous = Some(whole);
+        let measured = Measured {
+            prompt: whole.prompt,
+            noise_variance: whole.noise_variance,
+            code_error_chips: code_error_chips(&whole, reception)
+                + whole.mean(whole.code_offset_chips),
+            shifted_chips: whole.mean(whole.shifted_chips),
+            frequency: pair.map(|(a, b)| frequency(&a, &b, settings.pairs, reception)),
+        };
+        self.measured.push(measured);
+        Some(measured)
+    }
+
+    /// The measurements since the previous epoch as one; `None` where there are none.
+    pub(super) fn values(
+        &self,
+        settings: &SteeredSettings,
+        reception: &Reception,
+    ) -> Option<EpochValues> {
+        let n = self.measured.len() as f64;
+        let mean =
+            |value: &dyn Fn(&Measured) -> f64| self.measured.iter().map(value).sum::<f64>() / n;
+        let frequencies = || self.measured.iter().filter_map(|m| m.frequency);
+        let pairs = frequencies().count() as f64;
+        let interval_s = f64::from(settings.interval_periods) * reception.period_s;
+        let sums_s = match settings.pairs {
+            FrequencyPairs::Halves => interval_s / 2.0,
+            FrequencyPairs::Successive => interval_s,
+        };
+        (n > 0.0).then(|| EpochValues {
+            code_shift_chips: mean(&|m| m.code_error_chips + m.shifted_chips) - self.shifted_chips,
+            code_error_chips: mean(&|m| m.code_error_chips),
+            code_variance_chips2: reception.code_variance_chips2(interval_s) / n,
+            frequency_error_hz: frequencies().map(|f| f.error_hz).sum::<f64>() / pairs.max(1.0),
+            doppler_hz: frequencies().map(|f| f.doppler_hz).sum::<f64>() / pairs.max(1.0),
+            doppler_variance_hz2: reception.frequency_variance_hz2(sums_s) / pairs,
+        })
+    }
+
+    /// A new epoch begins.
+    pub(super) fn clear(&mut self) {
+        self.measured.clear();
+    }
+}
+
+impl Reception {
+    /// Signal over noise of `interval_s`, no less than what weak signals still can be told by.
+    fn snr(&self, interval_s: f64) -> f64 {
+        self.cn0_hz.max(LOWEST_CN0_HZ) * interval_s
+    }
+
+    /// Variance of the code error of coherent sums over `interval_s`, chips^2 (Kaplan2017, 8.95; of the
+    /// envelope's error the squaring loss is half of the power's).
+    fn code_variance_chips2(&self, interval_s: f64) -> f64 {
+        let (d, c) = (self.spacing_chips, self.snr(interval_s));
+        let squaring = if c > WEAK_SNR { 1.0 } else { 2.0 };
+        d / (4.0 * c) * (1.0 + squaring / ((2.0 - d) * c))
+    }
+
+    /// Variance of the frequency between two sums of `sums_s` each, their middles that far apart,
+    /// Hz^2.
+    fn frequency_variance_hz2(&self, sums_s: f64) -> f64 {
+        let c = self.snr(sums_s);
+        (1.0 + 0.5 / c) / c / (TAU * sums_s).powi(2)
+    }
+}
+
+/// Code error of coherent sums: the envelope's, or, of a weak signal, the power's over the power
+/// that its C/N0 promises, whose noise does not take away its slope.
+fn code_error_chips(sums: &Part, reception: &Reception) -> f64 {
+    let taps = EarlyPromptLate {
+        early: sums.early,
+        prompt: sums.prompt,
+        late: sums.late,
+    };
+    let snr = reception.snr(sums.periods as f64 * reception.period_s);
+    if snr > WEAK_SNR {
+        return CodeDiscriminator::Envelope.error_chips(&taps, reception.spacing_chips);
+    }
+    let peak = 1.0 - reception.spacing_chips / 2.0;
+    let power = snr * sums.noise_variance;
+    let error = (taps.early.norm_sqr() - taps.late.norm_sqr()) / (4.0 * peak * power);
+    error.clamp(-LARGEST_CHIPS, LARGEST_CHIPS)
+}
+
+fn frequency(a: &Part, b: &Part, pairs: FrequencyPairs, reception: &Reception) -> Frequency {
+    let apart_s = b.mean(b.middle_s) - a.mean(a.middle_s);
+    let oscillator_hz = (b.mean(b.cycles) - a.mean(a.cycles)) / apart_s;
+    let snr = reception.snr(a.periods as f64 * reception.period_s);
+    let error_hz = match pairs {
+        FrequencyPairs::Successive => {
+            FrequencyDiscriminator::CrossSignDot.error_hz(a.prompt, b.prompt, apart_s)
+        }
+        FrequencyPairs::Halves if 2.0 * snr > WEAK_SNR => {
+            FrequencyDiscriminator::FourQuadrant.error_hz(a.prompt, b.prompt, apart_s)
+        }
+        FrequencyPairs::Halves => {
+            let power = snr * (a.noise_variance + b.noise_variance) / 2.0;
+            let cross = (b.prompt * a.prompt.conj()).im;
+            (cross / power).clamp(-TAU / 2.0, TAU / 2.0) / (TAU * apart_s)
+        }
+    };
+    Frequency {
+        error_hz,
+        doppler_hz: oscillator_hz + error_hz,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::channel::Channel;
+    use super::super::simulated::IdealSignal;
+    use super::super::{Lock, NoiseFloor, TrackingSettings};
+    use super::*;
+    use crate::{CorrelatorBank, SignalId};
+
+    /// Steers a channel to the truth, off by an error, every 20 ms.
+    struct Run {
+        signal: IdealSignal,
+        channel: Channel,
+        noise: NoiseFloor,
+        code_error_chips: f64,
+        doppler_error_hz: f64,
+    }
+
+    /// Mean and mean square over their variance of errors.
+    #[derive(Default)]
+    struct Tally {
+        count: f64,
+        sum: f64,
+        squares: f64,
+    }
+
+    impl Tally {
+        fn add(&mut self, error: f64, variance: f64) {
+            if variance.is_finite() {
+                self.count += 1.0;
+                self.sum += error / variance.sqrt();
+                self.squares += error * error / variance;
+            }
+        }
+
+        fn join(&mut self, other: &Self) {
+            self.count += other.count;
+            self.sum += other.sum;
+            self.squares += other.squares;
+        }
+
+        fn mean_square(&self) -> f64 {
+            self.squares / self.count
+        }
+    }
+
+    impl Run {
+        fn new(cn0_dbhz: f64, seed: u64, steered: SteeredSettings) -> Self {
+            let signal = IdealSignal::new(cn0_dbhz, seed);
+            let settings = TrackingSettings {
+                steered,
+                ..TrackingSettings::default()
+            };
+            let start = steering(&signal, 0, 0.0, 0.0);
+            // Code phase 5000.3 chips from the start of a bit at tick 0.
+            let channel = Channel::predicted(signal.signal, signal.front_end, settings, &start, 4);
+            let unused = SignalId::gps_l1_ca(37).unwrap();
+            Self {
+                noise: NoiseFloor::new(unused, signal.front_end).unwrap(),
+                signal,
+                channel,
+                code_error_chips: 0.0,
+                doppler_error_hz: 0.0,
+            }
+        }
+
+        /// Tracks from 0 to `end_s`; errors of code phase (chips) and Doppler (Hz) after `settled_s`.
+        fn errors(&mut self, settled_s: f64, end_s: f64) -> (Tally, Tally) {
+            let (mut code, mut doppler) = (Tally::default(), Tally::default());
+            let fs = self.signal.front_end.sample_rate_hz;
+            let mut taps = Vec::new();
+            for k in 1..=(end_s * 50.0) as u64 {
+                let tick = k * (fs / 50.0) as u64;
+                while let Some(replica) = self.channel.replica().filter(|r| r.end_tick <= tick) {
+                    self.signal.correlate(&[replica], &mut taps).unwrap();
+                    self.channel.update(&replica, &taps[0], &self.noise);
+                }
+                let epoch = self.channel.epoch(tick).unwrap();
+                let t = tick as f64 / fs;
+                if t > settled_s {
+                    let error = epoch.code_phase_chips - self.signal.chips_at(t);
+                    let error = (error + 511.5).rem_euclid(1023.0) - 511.5;
+                    code.add(error, epoch.code_variance_chips2);
+                    let truth = self.signal.doppler_hz + self.signal.doppler_rate_hz_s * t;
+                    doppler.add(epoch.doppler_hz - truth, epoch.doppler_variance_hz2);
+                }
+                let wrong = if k % 2 == 0 { 1.0 } else { -1.0 };
+                let to = steering(
+                    &self.signal,
+                    tick,
+                    wrong * self.code_error_chips,
+                    wrong * self.doppler_error_hz,
+                );
+                assert!(self.channel.steer(&to));
+            }
+            (code, doppler)
+        }
+    }
+
+    fn steering(signal: &IdealSignal, tick: u64, code_error: f64, doppler_error: f64) -> Steering {
+        let t = tick as f64 / signal.front_end.sample_rate_hz;
+        let doppler_hz = signal.doppler_hz + signal.doppler_rate_hz_s * t + doppler_error;
+        Steering {
+            tick,
+            code_phase_chips: (signal.chips_at(t) + code_error).rem_euclid(1023.0),
+            code_rate_hz: 1.023e6 * (1.0 + doppler_hz / 1575.42e6),
+            doppler_hz,
+        }
+    }
+
+    #[test]
+    fn errors_are_those_reported_from_strong_to_weak() {
+        // 4000 epochs: the mean square is good to 2.2 %, carrier errors correlated twice that. At
+        // 15 dB-Hz errors are cut where no signal would be seen, and smaller than reported.
+        let cases = [
+            (45.0, true, 0.9..1.1, 0.9..1.1),
+            (35.0, true, 0.9..1.1, 0.9..1.1),
+            (35.0, false, 0.9..1.1, 0.93..1.1),
+            (21.0, true, 0.9..1.1, 0.9..1.1),
+            (15.0, true, 0.6..1.0, 0.4..1.0),
+        ];
+        for (cn0_dbhz, carrier_phase, code_range, doppler_range) in cases {
+            let (mut code, mut doppler) = (Tally::default(), Tally::default());
+            for seed in 0..4 {
+                let steered = SteeredSettings {
+                    carrier_phase,
+                    ..SteeredSettings::default()
+                };
+                let mut run = Run::new(cn0_dbhz, seed, steered);
+                // Steered a little wrong, to and fro, as a filter would.
+                (run.code_error_chips, run.doppler_error_hz) = (0.01, 0.5);
+                let (c, d) = run.errors(5.0, 25.0);
+                code.join(&c);
+                doppler.join(&d);
+            }
+            let (c, d) = (code.mean_square(), doppler.mean_square());
+            assert!(code_range.contains(&c), "code {c} at {cn0_dbhz}");
+            assert!(doppler_range.contains(&d), "Doppler {d} at {cn0_dbhz}");
+            // Four deviations of a mean of 4000.
+            assert!((code.sum / code.count).abs() < 0.063, "{cn0_dbhz}");
+        }
+    }
+
+    #[test]
+    fn equation_6_measures_the_doppler_too() {
+        let steered = SteeredSettings {
+            interval_periods: 10,
+            pairs: FrequencyPairs::Successive,
+            carrier_phase: false,
+        };
+        let mut run = Run::new(45.0, 5, steered);
+        let (code, doppler) = run.errors(2.0, 12.0);
+        // 500 epochs: 6 %; the two pairs of an epoch share a sum and partly cancel.
+        assert!((0.75..1.25).contains(&code.mean_square()));
+        assert!((0.3..1.25).contains(&doppler.mean_square()));
+    }
+
+    #[test]
+    fn a_signal_that_returns_is_taken_up_at_once() {
+        let mut run = Run::new(45.0, 11, SteeredSettings::default());
+        run.signal.ends_s = 3.0;
+        run.errors(0.0, 8.0);
+        assert_eq!(run.channel.lock(), Lock::Lost);
+        assert!(run.channel.is_steered() && run.channel.replica().is_some());
+    }
+}
