@@ -12,6 +12,9 @@ pub enum ReceiverError {
     /// The navigation layer failed.
     #[error(transparent)]
     Nav(#[from] gnss_nav::NavError),
+    /// A monitor was given what it cannot judge.
+    #[error(transparent)]
+    Monitor(#[from] fault_ml::MonitorError),
     /// A file could not be read or written.
     #[error("{}: {source}", path.display())]
     File {

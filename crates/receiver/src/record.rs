@@ -343,8 +343,27 @@ pub enum EventKind {
         /// Its threshold.
         threshold: f64,
     },
-    /// A satellite was taken back into the solution.
+    /// A satellite was taken back into the solution, or is no longer held faulty.
     Readmitted,
+    /// A satellite was found faulty, and is used all the same.
+    Alarm {
+        /// Who found it faulty.
+        monitor: String,
+        /// Its score.
+        score: f64,
+        /// Its threshold.
+        threshold: f64,
+    },
+    /// Another steers the channels from here on.
+    ModeSwitched {
+        /// Who.
+        to: LoopMembership,
+    },
+    /// Most channels contradicted the filter; it starts anew from least squares.
+    FilterReset {
+        /// How many.
+        channels: usize,
+    },
 }
 
 /// A satellite as acquired.

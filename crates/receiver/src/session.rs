@@ -4,9 +4,9 @@ use gnss_nav::GpsTime;
 use gnss_signal::{CorrelatorBank, SignalId};
 
 use crate::ReceiverError;
-use crate::config::{Ionosphere, RunConfig, Troposphere};
+use crate::config::{Ionosphere, Mode, RunConfig, Troposphere};
 use crate::cost::Meter;
-use crate::pipeline::{self, Aiding, Outcome, Settings};
+use crate::pipeline::{self, Aiding, Outcome, Settings, VectorSettings};
 use crate::rinex_nav::{self, NavigationFile};
 use crate::samples;
 use crate::sink::outputs::{Ending, OutputSettings, Outputs, write_cost};
@@ -57,7 +57,7 @@ impl Session {
         } = self;
         let mut outputs = Outputs::open(&OutputSettings {
             directory: config.out.clone(),
-            monitors: Vec::new(),
+            monitors: monitors(&config),
             dump_taps: config.dump_taps,
             // Not the name of the input: a file and standard input give the same bytes.
             title: "GPS receiver run".to_owned(),
@@ -104,8 +104,28 @@ fn settings(config: &RunConfig, nav: Option<NavigationFile>) -> Result<Settings,
         aiding,
         duration_s: config.recording.duration_s,
         dump_taps: config.dump_taps,
+        vector: (config.mode == Mode::Vector).then(|| vector(config)),
         ..Settings::default()
     })
+}
+
+/// Monitors whose scores are written.
+fn monitors(config: &RunConfig) -> Vec<String> {
+    let running = config.mode == Mode::Vector && config.innovation_test;
+    running
+        .then(|| "innovation".to_owned())
+        .into_iter()
+        .collect()
+}
+
+fn vector(config: &RunConfig) -> VectorSettings {
+    let default = VectorSettings::default();
+    VectorSettings {
+        filter: config.filter,
+        policy: config.policy,
+        monitor: default.monitor.filter(|_| config.innovation_test),
+        ..default
+    }
 }
 
 /// Ephemerides of another time than the recording's would silently help nothing.

@@ -6,7 +6,9 @@ use std::fmt;
 use gnss_nav::geodesy::Geodetic;
 use serde::{Deserialize, Serialize};
 
-use crate::record::{Acquired, ChannelRecord, Event, EventKind, PvtRecord, Record, Status};
+use crate::record::{
+    Acquired, ChannelRecord, Event, EventKind, LoopMembership, PvtRecord, Record, Status,
+};
 use crate::sink::rounded;
 
 /// `summary.json`; what does not apply is absent.
@@ -253,6 +255,7 @@ pub struct SummaryBuilder {
     first_fix_s: Option<f64>,
     fixes: u64,
     last: Option<PvtRecord>,
+    mode_switch_s: Option<f64>,
     faults: Vec<Fault>,
     channel_rows: u64,
     channel_epochs: u64,
@@ -288,7 +291,7 @@ impl SummaryBuilder {
             ephemerides_decoded: self.decoded.into_iter().collect(),
             first_fix_s: self.first_fix_s.map(|time_s| rounded(time_s, 6)),
             fixes: self.fixes,
-            mode_switch_s: None,
+            mode_switch_s: self.mode_switch_s.map(|time_s| rounded(time_s, 6)),
             no_fix_reason: no_fix_reason.filter(|_| self.first_fix_s.is_none()),
             position: self.last.as_ref().map(position),
             velocity: self.last.as_ref().map(velocity),
@@ -316,6 +319,22 @@ impl SummaryBuilder {
                 excluded_s: Some(rounded(event.time_s, 6)),
                 readmitted_s: None,
             }),
+            (EventKind::Alarm { monitor, .. }, Some(satellite)) => self.faults.push(Fault {
+                sat: satellite.to_string(),
+                prn: satellite.prn,
+                monitor: monitor.clone(),
+                alarm_s: rounded(event.time_s, 6),
+                excluded_s: None,
+                readmitted_s: None,
+            }),
+            (
+                EventKind::ModeSwitched {
+                    to: LoopMembership::Vector,
+                },
+                _,
+            ) => {
+                self.mode_switch_s.get_or_insert(event.time_s);
+            }
             (EventKind::Readmitted, Some(satellite)) => {
                 let open =
                     |fault: &&mut Fault| fault.prn == satellite.prn && fault.readmitted_s.is_none();

@@ -74,6 +74,9 @@ pub struct SatelliteInnovation {
     pub rate: Option<Innovation>,
     /// Where it stands in the sky of the predicted position.
     pub look: Look,
+    /// The part of its pseudorange's variance that lasts from epoch to epoch: ephemeris and delays,
+    /// m^2.
+    pub lasting_variance_m2: f64,
 }
 
 /// Innovations of one epoch against the prediction of a filter; only that filter, in that state,
@@ -142,6 +145,7 @@ fn innovation(
         code: Innovation::new(code, covariance),
         rate: rate.map(|row| Innovation::new(row, covariance)),
         look: expected.look,
+        lasting_variance_m2: code.variance - measurement.pseudorange_variance_m2,
     })
 }
 

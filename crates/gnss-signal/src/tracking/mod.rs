@@ -8,6 +8,7 @@ mod lock;
 pub mod loop_filter;
 mod nco;
 mod noise;
+mod presence;
 mod pull_in;
 mod sample_grid;
 mod settings;

@@ -11,8 +11,9 @@ use super::epoch::{ChannelEpoch, EpochValues, Integration, PhaseLine, PreFilter}
 use super::lock::LockDetector;
 use super::loop_filter::{CarrierBandwidth, CarrierLoop, CodeLoop};
 use super::nco::Nco;
+use super::presence::Presence;
 use super::sample_grid::{code_error_correction_chips, shift_chips};
-use super::steered::{Measured, Reception, Steered, SteeredSums, Steering};
+use super::steered::{Reception, Steered, SteeredSums, Steering};
 use super::{Lock, NavBit, TrackingSettings};
 use crate::Replica;
 
@@ -77,12 +78,10 @@ struct Bit {
 struct Fade {
     since_tick: u64,
     integrations: u32,
-    /// Sum of their C/N0, Hz.
-    cn0_hz: f64,
 }
 
-/// After so many the smoothed C/N0 is theirs: it would take seconds to fall that far. By chance so
-/// many happen once in 1e11.
+/// After so many a steered channel takes its signal for gone, without waiting for the smoothed C/N0
+/// to fall. By chance so many happen once in 1e11.
 const FADE_IS_REAL: u32 = 5;
 
 impl Steady {
@@ -126,11 +125,12 @@ impl Steady {
         let bit_edge = nco.code_period - i64::from(periods_into_bit);
         // Periods are counted from a bit's beginning, and never below zero.
         nco.code_period += bit_periods;
-        let weakest = cn0::ratio_hz(settings.lowest_cn0_dbhz);
+        let steered = Steered::new(Presence::absent());
         Self {
             bit_edge: bit_edge.rem_euclid(bit_periods),
-            helm: Helm::Navigation(Box::default()),
-            ..Self::new(nco, settings, weakest, 1.0)
+            helm: Helm::Navigation(Box::new(steered)),
+            lock: Lock::Lost,
+            ..Self::new(nco, settings, 0.0, 1.0)
         }
     }
 
@@ -163,7 +163,8 @@ impl Steady {
         let shift = (error + half).rem_euclid(2.0 * half) - half;
         self.nco.shift_code(shift);
         if let Helm::Own(_) = self.helm {
-            self.helm = Helm::Navigation(Box::default());
+            let presence = Presence::known(self.cn0_hz);
+            self.helm = Helm::Navigation(Box::new(Steered::new(presence)));
             self.pre_filter.clear();
         }
         if let Helm::Navigation(steered) = &mut self.helm {
@@ -261,13 +262,10 @@ impl Steady {
         };
         if let Some(measured) = steered.push(sums, &settings, &reception) {
             let interval_s = f64::from(settings.interval_periods) * reception.period_s;
-            let Measured {
-                prompt,
-                noise_variance,
-                ..
-            } = measured;
-            let now = cn0::against_noise_floor(prompt, noise_variance, interval_s);
-            self.cn0_hz += (interval_s / CN0_TIME_S).min(1.0) * (now - self.cn0_hz);
+            let now =
+                cn0::against_noise_floor(measured.prompt, measured.noise_variance, interval_s);
+            steered.presence.observe(now, interval_s);
+            self.cn0_hz = steered.presence.cn0_hz();
         }
     }
 
@@ -294,24 +292,7 @@ impl Steady {
 
     fn watch_power(&mut self, prompt: Complex64, noise: f64, interval_s: f64, tick: u64) {
         let now = cn0::against_noise_floor(prompt, noise, interval_s);
-        // Where the signal stands well out of the noise, a quarter of its power is no accident.
-        let faded = self.is_strong() && now < 0.25 * self.cn0_hz;
-        self.fade = match (faded, self.fade.integrations) {
-            (false, _) => Fade::default(),
-            (true, 0) => Fade {
-                since_tick: tick,
-                integrations: 1,
-                cn0_hz: now,
-            },
-            (true, n) => Fade {
-                integrations: n + 1,
-                cn0_hz: self.fade.cn0_hz + now,
-                ..self.fade
-            },
-        };
-        if self.is_steered() && self.fade.integrations == FADE_IS_REAL {
-            self.cn0_hz = (self.fade.cn0_hz / f64::from(FADE_IS_REAL)).max(0.0);
-        }
+        self.watch_fade(now, tick);
         if !self.is_steered() {
             self.cn0_hz += (interval_s / CN0_TIME_S).min(1.0) * (now - self.cn0_hz);
         }
@@ -319,15 +300,43 @@ impl Steady {
         let strong_enough = self.cn0_hz > limit;
         let patience_s = self.settings.patience_s;
         let before = self.lock;
-        self.lock = self
+        let seen = self
             .detector
             .update(prompt, strong_enough, interval_s, patience_s);
+        self.lock = match &self.helm {
+            Helm::Own(_) => seen,
+            Helm::Navigation(steered) if !steered.presence.is_present() => Lock::Lost,
+            Helm::Navigation(_) if seen == Lock::Lost => Lock::Code,
+            Helm::Navigation(_) => seen,
+        };
         self.slipped |= self.lock != Lock::Carrier;
         if before == Lock::Carrier
             && self.lock != Lock::Carrier
             && let Helm::Own(code) = &mut self.helm
         {
             code.widen(UNLOCKED_SIGMA_CHIPS * UNLOCKED_SIGMA_CHIPS);
+        }
+    }
+
+    /// Where the signal stands well out of the noise, a quarter of its power is no accident.
+    fn watch_fade(&mut self, now_hz: f64, tick: u64) {
+        let faded = self.is_strong() && now_hz < 0.25 * self.cn0_hz;
+        self.fade = match (faded, self.fade.integrations) {
+            (false, _) => Fade::default(),
+            (true, 0) => Fade {
+                since_tick: tick,
+                integrations: 1,
+            },
+            (true, n) => Fade {
+                integrations: n + 1,
+                ..self.fade
+            },
+        };
+        if self.fade.integrations == FADE_IS_REAL
+            && let Helm::Navigation(steered) = &mut self.helm
+        {
+            steered.presence = Presence::absent();
+            self.cn0_hz = 0.0;
         }
     }
 

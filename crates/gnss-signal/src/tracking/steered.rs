@@ -11,6 +11,7 @@ use num_complex::Complex64;
 
 use super::discriminator::{CodeDiscriminator, EarlyPromptLate, FrequencyDiscriminator};
 use super::epoch::EpochValues;
+use super::presence::Presence;
 
 /// Where navigation puts the oscillators of a channel.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -202,8 +203,9 @@ impl Interval {
 }
 
 /// What a channel keeps while navigation steers it.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub(super) struct Steered {
+    pub(super) presence: Presence,
     shifted_chips: f64,
     interval: Interval,
     /// Since the previous epoch.
@@ -211,6 +213,15 @@ pub(super) struct Steered {
 }
 
 impl Steered {
+    pub(super) fn new(presence: Presence) -> Self {
+        Self {
+            presence,
+            shifted_chips: 0.0,
+            interval: Interval::default(),
+            measured: Vec::new(),
+        }
+    }
+
     /// The code oscillator was shifted.
     pub(super) fn shifted(&mut self, chips: f64) {
         self.shifted_chips += chips;

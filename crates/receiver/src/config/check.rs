@@ -7,11 +7,15 @@ use gnss_signal::SignalId;
 use gnss_signal::sample::{SampleDescription, SampleFormat};
 
 use super::{
-    AcquireConfig, AcquireOptions, Input, Ionosphere, Isa, Recording, RunConfig, RunOptions,
+    AcquireConfig, AcquireOptions, Input, Ionosphere, Isa, Mode, Recording, RunConfig, RunOptions,
     Troposphere,
 };
 use crate::ReceiverError;
+use crate::pipeline::{FilterKind, Policy};
 use crate::sigmf::{self, Sidecar};
+
+/// Factor on the variance of a satellite whose weight is lowered: a tenth of its deviation's say.
+const DEWEIGHTED: f64 = 100.0;
 
 /// Where an option was given, for errors.
 pub(super) enum Origin {
@@ -60,6 +64,10 @@ impl Checks<'_> {
                 .map(|t| self.position(t))
                 .transpose()?,
             time: given.time.as_deref().map(|t| self.time(t)).transpose()?,
+            mode: self.mode(given)?,
+            filter: self.filter(given)?,
+            innovation_test: self.innovation_test(given)?,
+            policy: self.policy(given)?,
             rate_hz: given.rate.unwrap_or(10.0),
             ionosphere: self.ionosphere(given)?,
             troposphere: self.troposphere(given)?,
@@ -85,7 +93,10 @@ impl Checks<'_> {
         self.number("elevation-mask", mask, "0 to 90 (degrees)", |v| {
             (0.0..=90.0).contains(&v)
         })?;
-        self.choice("mode", given.mode.as_deref(), "scalar", &[("scalar", ())])?;
+        self.mode(given)?;
+        self.filter(given)?;
+        self.innovation_test(given)?;
+        self.policy(given)?;
         self.choice("raim", given.raim.as_deref(), "none", &[("none", ())])?;
         self.choice("dump", given.dump.as_deref(), "taps", &[("taps", ())])?;
         self.threads(given.threads)?;
@@ -266,6 +277,36 @@ impl Checks<'_> {
             return Err(self.wrong("prn", text, "GPS numbers 1 to 37, for instance 1,7,20-25"));
         }
         Ok(prns)
+    }
+
+    fn mode(&self, given: &RunOptions) -> Result<Mode, ReceiverError> {
+        let modes = [("scalar", Mode::Scalar), ("vector", Mode::Vector)];
+        self.choice("mode", given.mode.as_deref(), "scalar", &modes)
+    }
+
+    fn filter(&self, given: &RunOptions) -> Result<FilterKind, ReceiverError> {
+        let filters = [
+            ("sequential", FilterKind::Sequential),
+            ("batch", FilterKind::Batch),
+        ];
+        self.choice("filter", given.filter.as_deref(), "sequential", &filters)
+    }
+
+    fn innovation_test(&self, given: &RunOptions) -> Result<bool, ReceiverError> {
+        let monitors = [("innovation", true), ("none", false)];
+        self.choice("monitor", given.monitor.as_deref(), "innovation", &monitors)
+    }
+
+    fn policy(&self, given: &RunOptions) -> Result<Policy, ReceiverError> {
+        let deweight = Policy::Deweight {
+            variance_factor: DEWEIGHTED,
+        };
+        let policies = [
+            ("observe", Policy::Observe),
+            ("deweight", deweight),
+            ("exclude", Policy::Exclude),
+        ];
+        self.choice("policy", given.policy.as_deref(), "exclude", &policies)
     }
 
     fn ionosphere(&self, given: &RunOptions) -> Result<Ionosphere, ReceiverError> {

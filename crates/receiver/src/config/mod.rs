@@ -15,6 +15,8 @@ use std::path::PathBuf;
 use gnss_nav::{Geodetic, GpsTime};
 use gnss_signal::sample::SampleDescription;
 
+use crate::pipeline::{FilterKind, Policy};
+
 pub use options::{AcquireOptions, RunOptions};
 
 /// Where samples come from.
@@ -66,6 +68,15 @@ pub enum Troposphere {
     None,
 }
 
+/// Who steers the channels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Mode {
+    /// Each its own loops.
+    Scalar,
+    /// The navigation filter, once there is a consistent fix.
+    Vector,
+}
+
 /// Instruction set of the correlators.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Isa {
@@ -92,6 +103,14 @@ pub struct RunConfig {
     pub position: Option<Geodetic>,
     /// Rough GPS time of the first sample for an assisted start.
     pub time: Option<GpsTime>,
+    /// Who steers the channels.
+    pub mode: Mode,
+    /// Which filter, in vector mode.
+    pub filter: FilterKind,
+    /// Whether every channel is watched by the innovation test, in vector mode.
+    pub innovation_test: bool,
+    /// What follows from a monitor's alarm.
+    pub policy: Policy,
     /// Navigation epochs per second.
     pub rate_hz: f64,
     /// Model of the ionosphere.

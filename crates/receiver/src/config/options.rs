@@ -44,9 +44,20 @@ pub struct RunOptions {
     /// Rough GPS time of the first sample, week (unrolled) and seconds: assisted start
     #[arg(long, value_name = "WEEK:TOW")]
     pub time: Option<String>,
-    /// Tracking mode: scalar [default: scalar]
+    /// Tracking mode: scalar, or vector (one filter steers all channels once there is a consistent
+    /// fix) [default: scalar]
     #[arg(long, value_name = "MODE")]
     pub mode: Option<String>,
+    /// Filter of vector mode: sequential or batch [default: sequential]
+    #[arg(long, value_name = "FILTER")]
+    pub filter: Option<String>,
+    /// Monitor of every channel in vector mode: innovation or none [default: innovation]
+    #[arg(long, value_name = "MONITOR")]
+    pub monitor: Option<String>,
+    /// What follows from a monitor's alarm: observe, deweight (variance times 100) or exclude
+    /// [default: exclude]
+    #[arg(long, value_name = "POLICY")]
+    pub policy: Option<String>,
     /// Navigation epochs per second, up to 50 [default: 10]
     #[arg(long, value_name = "HZ")]
     pub rate: Option<f64>,
@@ -180,6 +191,9 @@ impl RunOptions {
             position: self.position.or(fallback.position),
             time: self.time.or(fallback.time),
             mode: self.mode.or(fallback.mode),
+            filter: self.filter.or(fallback.filter),
+            monitor: self.monitor.or(fallback.monitor),
+            policy: self.policy.or(fallback.policy),
             rate: self.rate.or(fallback.rate),
             raim: self.raim.or(fallback.raim),
             ionosphere: self.ionosphere.or(fallback.ionosphere),

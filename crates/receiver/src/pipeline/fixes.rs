@@ -12,6 +12,7 @@ use crate::ReceiverError;
 use crate::record::{EventKind, Record};
 
 impl<B: CorrelatorBank> Run<'_, B> {
+    /// Position, velocity and time of this epoch by least squares, and all its records.
     pub(super) fn navigate(&mut self, now: u64) -> Result<(), ReceiverError> {
         let time_s = self.time_s(now);
         let mut tracked: Vec<Tracked> = self
@@ -32,6 +33,7 @@ impl<B: CorrelatorBank> Run<'_, B> {
             (self.sink)(Record::Channel(record))?;
         }
         let fix = navigated.fix.as_ref();
+        self.consider_vector_tracking(now, fix)?;
         if let Some((solution, source)) = fix {
             self.report_exclusions(now, solution)?;
             self.report_fix(now, Fixed::Now)?;
@@ -42,7 +44,7 @@ impl<B: CorrelatorBank> Run<'_, B> {
         }
     }
 
-    fn report_fix(&mut self, now: u64, to: Fixed) -> Result<(), ReceiverError> {
+    pub(super) fn report_fix(&mut self, now: u64, to: Fixed) -> Result<(), ReceiverError> {
         let from = self.fixed;
         match (from, to) {
             (Fixed::Never, Fixed::Now) => {

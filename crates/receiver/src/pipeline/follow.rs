@@ -140,6 +140,7 @@ impl<B: CorrelatorBank> Run<'_, B> {
         };
         self.emit(jump.tick.min(now), None, kind)?;
         self.navigator.time_jumped();
+        self.leave_vector_tracking(now)?;
         for hit in &jump.hits {
             let fresh = self.slot(hit);
             let slot = self

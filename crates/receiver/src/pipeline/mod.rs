@@ -2,7 +2,8 @@
 //!
 //! Data goes down, from samples to records:
 //! advance -> search -> correlate -> loops and bits -> epochs -> measurements -> solution.
-//! Nothing goes up but the search for a satellite that was lost.
+//! Up goes the search for a satellite that was lost and, in vector tracking, where the filter steers
+//! every channel.
 
 mod clock;
 mod discontinuity;
@@ -17,7 +18,10 @@ mod settings;
 mod sky;
 mod slot;
 mod spectrum;
+mod vector;
+mod vector_mode;
 
 pub use outcome::Outcome;
 pub use run::run;
 pub use settings::{Aiding, Settings};
+pub use vector::{FilterKind, MeasurementNoise, Policy, VectorSettings};

@@ -6,7 +6,7 @@ use gnss_nav::constants::{L1_HZ, L1_WAVELENGTH_M, SPEED_OF_LIGHT_MPS};
 use gnss_nav::least_squares::{self, Consistency, Solution};
 use gnss_nav::measurement::{ErrorModel, Formed, MeasurementModel, RawMeasurement, form};
 use gnss_nav::prediction::{Expected, ReceiverState, predict};
-use gnss_nav::{Ephemeris, EphemerisStore, GpsTime, SatelliteId};
+use gnss_nav::{Ephemeris, EphemerisStore, GpsTime, NavState, SatelliteId};
 use gnss_signal::tracking::{ChannelEpoch, Lock};
 use nalgebra::Vector3;
 
@@ -129,6 +129,23 @@ impl Navigator {
         Some(-place.clock_drift_mps / L1_WAVELENGTH_M)
     }
 
+    /// Reading of the receiver's clock at `tick`, where it is good enough for pseudoranges.
+    pub(super) fn receive_time(&self, tick: u64) -> Option<GpsTime> {
+        let clock = self.clock.filter(|c| c.trust == ClockTrust::Fix)?;
+        Some(clock.at(tick))
+    }
+
+    /// Takes over where vector tracking has got to.
+    pub(super) fn follow(&mut self, state: &NavState) {
+        self.place = Some(Place {
+            position_ecef_m: state.position_ecef_m,
+            velocity_ecef_mps: state.velocity_ecef_mps,
+            clock_drift_mps: state.clock_drift_mps,
+            solved: true,
+        });
+        self.near = Some(state.time);
+    }
+
     /// Samples were lost or repeated: time is only roughly known from here on.
     pub(super) fn time_jumped(&mut self) {
         if let Some(clock) = &mut self.clock {
@@ -161,7 +178,7 @@ impl Navigator {
     ///
     /// Until the ionosphere's parameters are known its night-time delay stands in for it, with
     /// room for the day's.
-    fn model(&self) -> MeasurementModel {
+    pub(super) fn model(&self) -> MeasurementModel {
         let errors = ErrorModel::default();
         let ionosphere_fraction = if self.ionosphere.is_some() {
             errors.ionosphere_fraction

@@ -3,11 +3,12 @@
 use gnss_nav::constants::L1_WAVELENGTH_M;
 use gnss_nav::geodesy::Geodetic;
 use gnss_nav::least_squares::Solution;
-use gnss_nav::{SatelliteId, chi_square_threshold};
+use gnss_nav::{RawMeasurement, SatelliteId, chi_square_threshold};
 use gnss_signal::tracking::{ChannelEpoch, Lock};
 use nalgebra::Vector3;
 
 use super::navigator::{Navigated, Tracked, is_contradictory};
+use super::slot::Slot;
 use crate::record::{
     CarrierPhase, ChannelRecord, Disposition, InnovationRecord, LoopMembership, Observation,
     ObservationEpoch, PvtRecord, Source, Status,
@@ -54,7 +55,7 @@ pub(super) fn observations(
     let time = navigated.receive_time?;
     let observations = tracked
         .iter_mut()
-        .filter_map(|t| observation(t, navigated))
+        .filter_map(|t| observation_of(t, navigated))
         .collect();
     Some(ObservationEpoch {
         time_s,
@@ -63,20 +64,28 @@ pub(super) fn observations(
     })
 }
 
-fn observation(tracked: &mut Tracked, navigated: &Navigated) -> Option<Observation> {
+fn observation_of(tracked: &mut Tracked, navigated: &Navigated) -> Option<Observation> {
     let satellite = tracked.slot.satellite;
     let raw = navigated.raw.iter().find(|r| r.satellite == satellite)?;
-    let epoch = &tracked.epoch;
-    let cycles = raw.pseudorange_m / L1_WAVELENGTH_M;
-    let (phase, half_cycle) = tracked.slot.carrier_phase(epoch, cycles);
-    let look = navigated.fix.as_ref().and_then(|(solution, _)| {
-        solution
-            .satellites
-            .iter()
-            .find(|s| s.satellite == satellite)
+    let solution = navigated.fix.as_ref().map(|(solution, _)| solution);
+    let sight = solution.and_then(|s| {
+        let look = s.satellites.iter().find(|s| s.satellite == satellite)?;
+        Some((look.azimuth_rad, look.elevation_rad))
     });
-    Some(Observation {
-        satellite,
+    Some(observation(tracked.slot, &tracked.epoch, raw, sight))
+}
+
+/// An observation; `sight` is azimuth and elevation, rad.
+pub(super) fn observation(
+    slot: &mut Slot,
+    epoch: &ChannelEpoch,
+    raw: &RawMeasurement,
+    sight: Option<(f64, f64)>,
+) -> Observation {
+    let cycles = raw.pseudorange_m / L1_WAVELENGTH_M;
+    let (phase, half_cycle) = slot.carrier_phase(epoch, cycles);
+    Observation {
+        satellite: slot.satellite,
         pseudorange_m: raw.pseudorange_m,
         doppler_hz: epoch.doppler_hz,
         cn0_dbhz: epoch.cn0_dbhz,
@@ -85,9 +94,9 @@ fn observation(tracked: &mut Tracked, navigated: &Navigated) -> Option<Observati
             loss_of_lock: epoch.phase_slipped,
             half_cycle,
         }),
-        azimuth_rad: look.map(|l| l.azimuth_rad),
-        elevation_rad: look.map(|l| l.elevation_rad),
-    })
+        azimuth_rad: sight.map(|s| s.0),
+        elevation_rad: sight.map(|s| s.1),
+    }
 }
 
 /// A channel as a record.

@@ -13,6 +13,7 @@ use super::schedule::Schedule;
 use super::settings::Settings;
 use super::slot::Slot;
 use super::spectrum::SpectrumSense;
+use super::vector::VectorTracking;
 use crate::ReceiverError;
 use crate::record::{Event, EventKind, Record};
 
@@ -50,6 +51,8 @@ pub fn run<B: CorrelatorBank>(
         fixed: Fixed::Never,
         channel_steps: 0,
         steps: 0,
+        vector: None,
+        consistent_fixes: 0,
     };
     run.until_the_end()
 }
@@ -81,22 +84,31 @@ pub(super) struct Run<'a, B> {
     pub(super) fixed: Fixed,
     pub(super) channel_steps: usize,
     pub(super) steps: usize,
+    pub(super) vector: Option<VectorTracking>,
+    /// Successive fixes whose measurements agree.
+    pub(super) consistent_fixes: u32,
 }
 
 impl<B: CorrelatorBank> Run<'_, B> {
     fn until_the_end(&mut self) -> Result<Outcome, ReceiverError> {
+        // Twice as fine as an interval of the filter that is shorter than a step.
+        let vector = self.settings.vector.as_ref();
+        let step_s = vector.map_or(STEP_S, |v| v.interval_s.min(STEP_S));
         let (mut step, mut epoch) = (1, 1);
         let last = self.settings.duration_s.map_or(u64::MAX, |s| self.tick(s));
         loop {
             let (next_step, next_epoch) = (
-                self.tick(f64::from(step) * STEP_S),
+                self.tick(f64::from(step) * step_s),
                 self.tick(f64::from(epoch) / self.settings.rate_hz),
             );
             let target = next_step.min(next_epoch).min(last);
             let now = self.bank.advance_to(target)?.min(target);
             let ended = now < target || now == last;
             self.receive(now, ended)?;
-            if now == next_epoch || (ended && epoch == 1) {
+            let due = now == next_epoch || (ended && epoch == 1);
+            if self.vector.is_some() {
+                self.navigate_by_filter(now, due)?;
+            } else if due {
                 self.navigate(now)?;
             }
             if ended {

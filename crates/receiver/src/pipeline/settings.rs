@@ -6,6 +6,8 @@ use gnss_signal::SignalId;
 use gnss_signal::tracking::TrackingSettings;
 use nalgebra::Vector3;
 
+use super::vector::VectorSettings;
+
 /// Settings of a run.
 #[derive(Debug, Clone)]
 pub struct Settings {
@@ -32,6 +34,8 @@ pub struct Settings {
     pub duration_s: Option<f64>,
     /// Whether every integration's sums are reported.
     pub dump_taps: bool,
+    /// Vector tracking once there is a consistent fix; `None`: scalar tracking throughout.
+    pub vector: Option<VectorSettings>,
 }
 
 /// What is known from elsewhere before the first sample.
@@ -63,6 +67,7 @@ impl Default for Settings {
             aiding: Aiding::default(),
             duration_s: None,
             dump_taps: false,
+            vector: None,
         }
     }
 }

@@ -80,7 +80,13 @@ enum Detail<'a> {
         iode: u8,
         iodc: u16,
     },
-    Excluded {
+    Mode {
+        to: &'static str,
+    },
+    Reset {
+        channels: usize,
+    },
+    Alarm {
         monitor: &'a str,
         score: f64,
         threshold: f64,
@@ -105,6 +111,9 @@ pub const fn kind_name(kind: &EventKind) -> &'static str {
         EventKind::FixLost => "fix_lost",
         EventKind::Excluded { .. } => "excluded",
         EventKind::Readmitted => "readmitted",
+        EventKind::Alarm { .. } => "alarm",
+        EventKind::ModeSwitched { .. } => "mode_switched",
+        EventKind::FilterReset { .. } => "filter_reset",
     }
 }
 
@@ -141,11 +150,20 @@ fn detail(kind: &EventKind) -> Detail<'_> {
             iode: *iode,
             iodc: *iodc,
         },
-        EventKind::Excluded {
+        EventKind::ModeSwitched { to } => Detail::Mode { to: to.name() },
+        EventKind::FilterReset { channels } => Detail::Reset {
+            channels: *channels,
+        },
+        EventKind::Alarm {
             monitor,
             score,
             threshold,
-        } => Detail::Excluded {
+        }
+        | EventKind::Excluded {
+            monitor,
+            score,
+            threshold,
+        } => Detail::Alarm {
             monitor,
             score: *score,
             threshold: *threshold,

@@ -14,7 +14,8 @@ use nalgebra::Vector3;
 use super::file::OutputFile;
 use crate::ReceiverError;
 use crate::record::{
-    ChannelRecord, Event, EventKind, InnovationRecord, ObservationEpoch, PvtRecord, Record, Status,
+    ChannelRecord, Event, EventKind, InnovationRecord, LoopMembership, ObservationEpoch, PvtRecord,
+    Record, Status,
 };
 use crate::summary::Summary;
 use crate::truth::SolutionError;
@@ -133,6 +134,14 @@ impl Report {
             EventKind::Discontinuity { .. } => "sample jump",
             EventKind::FirstFix => "first fix",
             EventKind::FixLost => "fix lost",
+            EventKind::Alarm { .. } => "alarm",
+            EventKind::FilterReset { .. } => "filter reset",
+            EventKind::ModeSwitched {
+                to: LoopMembership::Vector,
+            } => "vector tracking",
+            EventKind::ModeSwitched {
+                to: LoopMembership::Scalar,
+            } => "scalar tracking",
             _ => return,
         };
         if self.marks.len() < MOST_MARKS {

@@ -1,0 +1,71 @@
+//! Between the filter's state and the channels: what they measured, and where they are put.
+
+use gnss_nav::constants::{L1_WAVELENGTH_M, SPEED_OF_LIGHT_MPS};
+use gnss_nav::prediction::Expected;
+use gnss_nav::{GpsTime, RawMeasurement, SatelliteId};
+use gnss_signal::tracking::{ChannelEpoch, Steering};
+
+use super::settings::{MeasurementNoise, VectorSettings};
+use super::{Surroundings, VectorTracking};
+use crate::pipeline::slot::Slot;
+
+impl VectorTracking {
+    /// Puts every channel whose bit boundaries are known where its signal is expected.
+    pub(in crate::pipeline) fn steer(&self, around: &Surroundings, slots: &mut [Slot]) {
+        for slot in slots {
+            if let Some(expected) = self.expected(around, slot.satellite) {
+                slot.channel.steer(&steering(around.tick, &expected));
+            }
+        }
+    }
+}
+
+/// The oscillators of a signal that arrives as expected at `tick`.
+pub(super) fn steering(tick: u64, expected: &Expected) -> Steering {
+    Steering {
+        tick,
+        code_phase_chips: expected.code_phase_chips(),
+        code_rate_hz: expected.code_rate_hz(),
+        doppler_hz: expected.doppler_hz,
+    }
+}
+
+/// The measurement of a steered channel: the code phase nearest to the one expected; `None` where
+/// nothing was measured.
+pub(super) fn raw_measurement(
+    epoch: &ChannelEpoch,
+    satellite: SatelliteId,
+    receive_time: GpsTime,
+    expected: &Expected,
+    settings: &VectorSettings,
+) -> Option<RawMeasurement> {
+    if !epoch.code_variance_chips2.is_finite() {
+        return None;
+    }
+    let spec = epoch.signal.spec();
+    let length = f64::from(spec.code_length_chips);
+    let ahead = epoch.code_phase_chips - expected.code_phase_chips();
+    let ahead = (ahead + length / 2.0).rem_euclid(length) - length / 2.0;
+    let transmit_time = expected.transmit_time + ahead / spec.code_rate_hz;
+    let chip_m = SPEED_OF_LIGHT_MPS / spec.code_rate_hz;
+    let (code, rate) = match settings.noise {
+        MeasurementNoise::Measured => (
+            epoch.code_variance_chips2 * chip_m * chip_m,
+            epoch.doppler_variance_hz2 * L1_WAVELENGTH_M * L1_WAVELENGTH_M,
+        ),
+        MeasurementNoise::Fixed {
+            pseudorange_m2,
+            range_rate_m2_s2,
+        } => (pseudorange_m2, range_rate_m2_s2),
+    };
+    let has_rate = epoch.doppler_variance_hz2.is_finite();
+    Some(RawMeasurement {
+        satellite,
+        transmit_time,
+        pseudorange_m: RawMeasurement::pseudorange_m(receive_time, transmit_time),
+        range_rate_mps: -L1_WAVELENGTH_M * epoch.doppler_hz,
+        pseudorange_variance_m2: code,
+        range_rate_variance_m2: if has_rate { rate } else { f64::INFINITY },
+        cn0_dbhz: epoch.cn0_dbhz,
+    })
+}
