@@ -47,8 +47,7 @@ impl Presence {
 
     /// Takes the C/N0 of one interval of `interval_s`, as its power says, Hz.
     ///
-    /// Noise alone has a mean of 0 and a deviation of 1 / interval. A signal is back when the mean
-    /// of n intervals exceeds (5 / sqrt(n) + 9 / n) / interval, which noise does once in 1e6.
+    /// Noise alone has a mean of 0 and a deviation of 1 / interval.
     pub(super) fn observe(&mut self, cn0_hz: f64, interval_s: f64) {
         let memory_s = if self.cn0_hz > WEAK_HZ {
             MEMORY_S
@@ -57,13 +56,24 @@ impl Presence {
         };
         self.intervals = (self.intervals + 1.0).min(memory_s / interval_s);
         self.cn0_hz += (cn0_hz - self.cn0_hz) / self.intervals;
-        self.present = if self.present {
-            self.cn0_hz > GONE_HZ
+        if self.present {
+            self.present = self.cn0_hz > GONE_HZ;
+        } else if exceeds_noise(cn0_hz * interval_s, 1.0) {
+            // What was averaged before was not this signal.
+            *self = Self {
+                cn0_hz,
+                intervals: 1.0,
+                present: true,
+            };
         } else {
-            let n = self.intervals;
-            self.cn0_hz * interval_s > 5.0 / n.sqrt() + 9.0 / n
-        };
+            self.present = exceeds_noise(self.cn0_hz * interval_s, self.intervals);
+        }
     }
+}
+
+/// Whether the mean signal over noise of `n` intervals is more than noise alone shows once in 1e6.
+fn exceeds_noise(snr: f64, n: f64) -> bool {
+    snr > 5.0 / n.sqrt() + 9.0 / n
 }
 
 #[cfg(test)]

@@ -13,7 +13,7 @@ use super::loop_filter::{CarrierBandwidth, CarrierLoop, CodeLoop};
 use super::nco::Nco;
 use super::presence::Presence;
 use super::sample_grid::{code_error_correction_chips, shift_chips};
-use super::steered::{Reception, Steered, SteeredSums, Steering};
+use super::steered::{Reception, Silence, Steered, SteeredSums, Steering};
 use super::{Lock, NavBit, TrackingSettings};
 use crate::Replica;
 
@@ -333,6 +333,7 @@ impl Steady {
             },
         };
         if self.fade.integrations == FADE_IS_REAL
+            && self.settings.steered.silence == Silence::LeftOut
             && let Helm::Navigation(steered) = &mut self.helm
         {
             steered.presence = Presence::absent();
@@ -438,9 +439,13 @@ impl Steady {
                 }
             }
             Helm::Navigation(steered) => {
+                let silent =
+                    self.fade.integrations > 0 && self.settings.steered.silence == Silence::LeftOut;
                 let values = steered.values(&self.settings.steered, &self.reception());
-                let values = values.unwrap_or(EpochValues::nothing(self.nco.doppler_hz));
-                if self.lock != Lock::Carrier {
+                let values = values
+                    .filter(|_| !silent)
+                    .unwrap_or(EpochValues::nothing(self.nco.doppler_hz));
+                if self.lock != Lock::Carrier || silent {
                     return values;
                 }
                 let (doppler_hz, doppler_variance_hz2) = self.oscillator_doppler(tick);

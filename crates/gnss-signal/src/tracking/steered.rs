@@ -36,6 +36,15 @@ pub enum FrequencyPairs {
     Successive,
 }
 
+/// What a steered channel measures of a signal that is gone.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Silence {
+    /// Nothing, until the signal is back.
+    LeftOut,
+    /// The noise, as if it were the signal.
+    Measured,
+}
+
 /// How a steered channel measures.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SteeredSettings {
@@ -47,6 +56,8 @@ pub struct SteeredSettings {
     /// Whether the carrier phase is tracked where the signal allows, beside navigation's Doppler.
     /// Default: it is.
     pub carrier_phase: bool,
+    /// What is measured of a signal that is gone. Default: nothing.
+    pub silence: Silence,
 }
 
 impl Default for SteeredSettings {
@@ -55,6 +66,7 @@ impl Default for SteeredSettings {
             interval_periods: 20,
             pairs: FrequencyPairs::Halves,
             carrier_phase: true,
+            silence: Silence::LeftOut,
         }
     }
 }
@@ -250,7 +262,10 @@ impl Steered {
             shifted_chips: whole.mean(whole.shifted_chips),
             frequency: pair.map(|(a, b)| frequency(&a, &b, settings.pairs, reception)),
         };
-        self.measured.push(measured);
+        // The interval in which a signal returns is only partly its own.
+        if self.presence.is_present() || settings.silence == Silence::Measured {
+            self.measured.push(measured);
+        }
         Some(measured)
     }
 
@@ -497,6 +512,7 @@ mod tests {
             interval_periods: 10,
             pairs: FrequencyPairs::Successive,
             carrier_phase: false,
+            ..SteeredSettings::default()
         };
         let mut run = Run::new(45.0, 5, steered);
         let (code, doppler) = run.errors(2.0, 12.0);

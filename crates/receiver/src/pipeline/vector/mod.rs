@@ -38,8 +38,9 @@ const NEEDED: usize = 4;
 const STALE_S: f64 = 0.1;
 /// Healthy for so long, s, a satellite is believed again.
 const READMIT_S: f64 = 2.0;
-/// Past this deviation of the predicted range, m, a signal lies outside the taps: a third of a chip.
-const LOST_M: f64 = 100.0;
+/// Past this deviation of a predicted range, m, a signal is likely to lie outside the taps: half a
+/// chip.
+const LOST_M: f64 = 150.0;
 
 /// What becomes of vector tracking after an epoch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -155,10 +156,8 @@ impl VectorTracking {
     fn member(&mut self, around: &Surroundings, slot: &mut Slot) -> Option<Member> {
         let satellite = slot.satellite;
         let expected = self.expected(around, satellite)?;
-        let fading = slot.channel.faded_since().is_some();
         let epoch = slot.channel.epoch(around.tick)?;
-        let present = epoch.lock != Lock::Lost;
-        if !present {
+        if epoch.lock == Lock::Lost {
             self.watch(satellite).lost();
         }
         let raw = steering::raw_measurement(
@@ -168,11 +167,10 @@ impl VectorTracking {
             &expected,
             &self.settings,
         );
-        let always = matches!(self.settings.noise, MeasurementNoise::Fixed { .. });
         Some(Member {
             satellite,
             epoch,
-            raw: raw.filter(|_| always || (present && !fading)),
+            raw,
             innovation: None,
             disposition: None,
             used: false,
@@ -216,7 +214,7 @@ impl VectorTracking {
         }
         let covariance = self.filter.covariance();
         let position: f64 = [0, 2, 4].iter().map(|i| covariance[(*i, *i)]).sum();
-        if (position + covariance[(6, 6)]).sqrt() > LOST_M {
+        if (position / 3.0 + covariance[(6, 6)]).sqrt() > LOST_M {
             self.outlook = Outlook::Lost;
         }
         Ok(())
