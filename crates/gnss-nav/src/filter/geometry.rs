@@ -1,6 +1,6 @@
 //! What the satellites of an epoch make of errors: dilution, and biases that no filter averages.
 
-use nalgebra::{Matrix4, SMatrix};
+use nalgebra::{Matrix4, SMatrix, Vector4};
 
 use super::innovation::{Innovations, SatelliteInnovation};
 use super::{Covariance, STATES};
@@ -19,6 +19,8 @@ pub struct EpochGeometry {
     /// A filter that takes each measurement's error for new believes to average them away. Its
     /// estimate settles where weighted least squares would, and keeps this on top of what it reports.
     pub lasting_covariance_m2: Matrix4<f64>,
+    /// The same by tracking noise, m^2.
+    pub noise_covariance_m2: Matrix4<f64>,
 }
 
 impl EpochGeometry {
@@ -34,6 +36,19 @@ impl EpochGeometry {
             covariance[(row, column)] + lasting
         })
     }
+
+    /// `covariance` of a filter that starts from least squares, its position and clock bias known as
+    /// well as tracking noise lets them: what lasts it must not average away.
+    #[must_use]
+    pub fn with_noise_alone(&self, covariance: &Covariance) -> Covariance {
+        let mut own = *covariance;
+        for row in 0..4 {
+            for column in 0..4 {
+                own[(2 * row, 2 * column)] = self.noise_covariance_m2[(row, column)];
+            }
+        }
+        own
+    }
 }
 
 impl Innovations {
@@ -47,21 +62,60 @@ impl Innovations {
             .iter()
             .filter(|s| used(s.satellite))
             .collect();
-        let sum = |weight: &dyn Fn(&SatelliteInnovation) -> f64| {
-            satellites.iter().fold(Matrix4::zeros(), |sum, s| {
-                let gradient = s.code.row().gradient;
-                sum + gradient * gradient.transpose() * weight(s)
-            })
+        let unweighted = inverse(normal(&satellites, |_| 1.0))?;
+        let weighted = inverse(normal(&satellites, weight))?;
+        let by = |variance: fn(&SatelliteInnovation) -> f64| {
+            let weighed = normal(&satellites, |s| weight(s) * weight(s) * variance(s));
+            let covariance = weighted * weighed * weighted;
+            (covariance + covariance.transpose()) / 2.0
         };
-        let inverse = |matrix: Matrix4<f64>| matrix.cholesky().map(|c| c.inverse());
-        let unweighted = inverse(sum(&|_| 1.0)).ok_or(NavError::Singular)?;
-        let weight = |s: &SatelliteInnovation| 1.0 / s.code.noise_variance();
-        let weighted = inverse(sum(&weight)).ok_or(NavError::Singular)?;
-        let lasting = sum(&|s| weight(s) * weight(s) * s.lasting_variance_m2);
         Ok(EpochGeometry {
             satellites: satellites.len(),
             pdop: unweighted.diagonal().xyz().sum().sqrt(),
-            lasting_covariance_m2: weighted * lasting * weighted,
+            lasting_covariance_m2: by(|s| s.lasting_variance_m2),
+            noise_covariance_m2: by(|s| s.code.noise_variance() - s.lasting_variance_m2),
         })
     }
+
+    /// How weighted least squares would move position (ECEF) and clock bias, m, had the pseudoranges
+    /// these innovations instead of those of `before`, by another model of the delays.
+    ///
+    /// # Errors
+    /// [`NavError::Singular`] for fewer than four satellites in both, or all in a cone.
+    pub fn shift_from(&self, before: &Self) -> Result<Vector4<f64>, NavError> {
+        let pairs: Vec<_> = self
+            .satellites()
+            .iter()
+            .filter_map(|now| {
+                let mut all = before.satellites().iter();
+                let old = all.find(|old| old.satellite == now.satellite)?;
+                Some((now, now.code.value() - old.code.value()))
+            })
+            .collect();
+        let satellites: Vec<_> = pairs.iter().map(|(now, _)| *now).collect();
+        let right = pairs.iter().fold(Vector4::zeros(), |sum, (now, change)| {
+            sum + now.code.row().gradient * (weight(now) * change)
+        });
+        Ok(inverse(normal(&satellites, weight))? * right)
+    }
+}
+
+/// Sum of the outer products of the satellites' gradients, weighted.
+fn normal(
+    satellites: &[&SatelliteInnovation],
+    weight: impl Fn(&SatelliteInnovation) -> f64,
+) -> Matrix4<f64> {
+    satellites.iter().fold(Matrix4::zeros(), |sum, s| {
+        let gradient = s.code.row().gradient;
+        sum + gradient * gradient.transpose() * weight(s)
+    })
+}
+
+fn weight(satellite: &SatelliteInnovation) -> f64 {
+    1.0 / satellite.code.noise_variance()
+}
+
+fn inverse(matrix: Matrix4<f64>) -> Result<Matrix4<f64>, NavError> {
+    let cholesky = matrix.cholesky().ok_or(NavError::Singular)?;
+    Ok(cholesky.inverse())
 }

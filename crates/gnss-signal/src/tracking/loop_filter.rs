@@ -83,27 +83,6 @@ impl CarrierLoop {
     pub const fn rate_hz_s(&self) -> f64 {
         self.rate_hz_s
     }
-
-    /// Variance of the frequency that [`CarrierLoop::update`] returns, Hz^2, in a locked loop without
-    /// frequency assistance, whose phases are measured with a variance of `phase_cycles2` each.
-    ///
-    /// Nearly all of it is what the last phase error, noise and jitter of the loop (2 B T of the
-    /// noise), adds through the proportional term and the first integrator. Successive ones share
-    /// next to nothing.
-    #[must_use]
-    pub fn frequency_variance_hz2(
-        &self,
-        phase_cycles2: f64,
-        bandwidth: CarrierBandwidth,
-        interval_s: f64,
-    ) -> f64 {
-        let (w, proportional, first_integrator) = match self.order {
-            LoopOrder::Second => (bandwidth.phase_hz / 0.53, 1.414, 1.0),
-            LoopOrder::Third => (bandwidth.phase_hz / 0.7845, 2.4, 1.1),
-        };
-        let gain_hz = w * (proportional + first_integrator * w * interval_s);
-        phase_cycles2 * (1.0 + 2.0 * bandwidth.phase_hz * interval_s) * gain_hz * gain_hz
-    }
 }
 
 /// A carrier-aided code loop: a Kalman filter of code phase and of the rate at which the code

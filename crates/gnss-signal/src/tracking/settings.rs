@@ -107,7 +107,10 @@ impl TrackingSettings {
         }
         let interval = self.steered.interval_periods;
         let least = self.steered.integration_periods(self.integration_periods);
-        if ![1, 2, 4, 5, 10, 20].contains(&interval) || least == 0 || interval % least != 0 {
+        if ![1, 2, 4, 5, 10, 20].contains(&interval)
+            || !interval.is_multiple_of(least.max(1))
+            || least == 0
+        {
             return refuse(
                 "measuring interval under navigation (code periods)",
                 interval.to_string(),

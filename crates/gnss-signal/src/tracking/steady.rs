@@ -235,6 +235,10 @@ impl Steady {
             };
             self.take_steered(&sums);
             self.follow_phase(phase_error, interval_s);
+            if let Helm::Navigation(steered) = &mut self.helm {
+                let locked = self.lock == Lock::Carrier;
+                steered.follow_lock(locked, self.nco.tick, self.nco.doppler_cycles);
+            }
         } else {
             let code_error = self
                 .settings
@@ -271,7 +275,7 @@ impl Steady {
 
     /// Tracks the carrier phase beside navigation's Doppler, where the signal allows.
     fn follow_phase(&mut self, phase_cycles: f64, interval_s: f64) {
-        if self.settings.steered.carrier_phase && self.cn0_hz > PHASE_CN0_HZ {
+        if self.follows_phase() {
             let bandwidth = CarrierBandwidth {
                 frequency_hz: 0.0,
                 ..self.settings.locked_bandwidth
@@ -280,6 +284,11 @@ impl Steady {
                 .carrier
                 .update(phase_cycles, 0.0, bandwidth, interval_s);
         }
+    }
+
+    /// Whether a steered channel tracks the carrier phase.
+    fn follows_phase(&self) -> bool {
+        self.settings.steered.carrier_phase && self.cn0_hz > PHASE_CN0_HZ
     }
 
     fn reception(&self) -> Reception {
@@ -306,8 +315,8 @@ impl Steady {
         self.lock = match &self.helm {
             Helm::Own(_) => seen,
             Helm::Navigation(steered) if !steered.presence.is_present() => Lock::Lost,
-            Helm::Navigation(_) if seen == Lock::Lost => Lock::Code,
-            Helm::Navigation(_) => seen,
+            Helm::Navigation(_) if seen == Lock::Carrier && self.follows_phase() => seen,
+            Helm::Navigation(_) => Lock::Code,
         };
         self.slipped |= self.lock != Lock::Carrier;
         if before == Lock::Carrier
@@ -445,31 +454,39 @@ impl Steady {
                 let values = values
                     .filter(|_| !silent)
                     .unwrap_or(EpochValues::nothing(self.nco.doppler_hz));
-                if self.lock != Lock::Carrier || silent {
-                    return values;
-                }
-                let (doppler_hz, doppler_variance_hz2) = self.oscillator_doppler(tick);
-                EpochValues {
-                    doppler_hz,
-                    doppler_variance_hz2,
-                    ..values
+                let locked = self.oscillator_doppler(steered, tick);
+                match locked.filter(|_| self.lock == Lock::Carrier && !silent) {
+                    None => values,
+                    Some((doppler_hz, doppler_variance_hz2)) => EpochValues {
+                        doppler_hz,
+                        doppler_variance_hz2,
+                        ..values
+                    },
                 }
             }
         }
     }
 
-    /// Doppler of a locked carrier oscillator at `tick`, Hz, and its variance, Hz^2.
-    fn oscillator_doppler(&self, tick: u64) -> (f64, f64) {
+    /// Doppler of a locked carrier oscillator at `tick`, Hz, and its variance, Hz^2; `None` just after
+    /// lock.
+    ///
+    /// The mean over the last tenth of a second, carried on by the loop's acceleration. Its noise is
+    /// the jitter of the oscillator's phase at both ends (2 B T of the phase noise each); the
+    /// acceleration, which follows the last phases, adds as much again.
+    fn oscillator_doppler(&self, steered: &Steered, tick: u64) -> Option<(f64, f64)> {
+        let rate_hz = self.nco.front_end.sample_rate_hz;
+        let (since_tick, since_cycles) = steered.locked_since()?;
+        let span_s = (self.nco.tick - since_tick) as f64 / rate_hz;
         let interval_s = self.interval_s();
-        let middle_s = interval_s / 2.0;
-        let ahead_s = tick.saturating_sub(self.nco.tick) as f64 / self.nco.front_end.sample_rate_hz;
-        let doppler_hz = self.nco.doppler_hz + self.carrier.rate_hz_s() * (ahead_s - middle_s);
+        if span_s < 1.5 * interval_s {
+            return None;
+        }
+        let mean_hz = (self.nco.doppler_cycles - since_cycles) / span_s;
+        let ahead_s = tick.saturating_sub(self.nco.tick) as f64 / rate_hz + span_s / 2.0;
         let phase = costas_variance_cycles2(self.snr(interval_s));
-        let bandwidth = self.settings.locked_bandwidth;
-        let variance = self
-            .carrier
-            .frequency_variance_hz2(phase, bandwidth, interval_s);
-        (doppler_hz, variance)
+        let jitter = 2.0 * self.settings.locked_bandwidth.phase_hz * interval_s * phase;
+        let doppler_hz = mean_hz + self.carrier.rate_hz_s() * ahead_s;
+        Some((doppler_hz, 4.0 * jitter / (span_s * span_s)))
     }
 
     /// Doppler at `tick`, Hz, and its variance, Hz^2: the slope of the phase where it is locked.

@@ -32,8 +32,8 @@ impl<B: CorrelatorBank> Run<'_, B> {
             let record = report::channel(time_s, one, &navigated);
             (self.sink)(Record::Channel(record))?;
         }
+        self.consider_vector_tracking(now, &navigated)?;
         let fix = navigated.fix.as_ref();
-        self.consider_vector_tracking(now, fix)?;
         if let Some((solution, source)) = fix {
             self.report_exclusions(now, solution)?;
             self.report_fix(now, Fixed::Now)?;

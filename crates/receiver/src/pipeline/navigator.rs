@@ -52,6 +52,17 @@ pub(super) struct Navigated {
     pub(super) raw: Vec<RawMeasurement>,
 }
 
+impl Navigated {
+    /// The solution, where it is one of least squares whose measurements agree.
+    pub(super) fn consistent(&self) -> Option<&Solution> {
+        let (solution, source) = self.fix.as_ref()?;
+        let consistent = *source == Source::LeastSquares
+            && solution.consistency == Consistency::Passed
+            && solution.velocity.is_some();
+        consistent.then_some(solution)
+    }
+}
+
 /// Knows ephemerides, time and place, and finds the next.
 #[derive(Debug)]
 pub(super) struct Navigator {

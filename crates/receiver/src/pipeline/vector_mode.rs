@@ -1,13 +1,12 @@
 //! From scalar to vector tracking and back, and the epochs between.
 
-use gnss_nav::Solution;
-use gnss_nav::least_squares::Consistency;
 use gnss_signal::CorrelatorBank;
 
+use super::navigator::{Navigated, Navigator};
 use super::run::{Fixed, Run};
 use super::vector::{self, Outlook, Surroundings, VectorTracking};
 use crate::ReceiverError;
-use crate::record::{EventKind, LoopMembership, Record, Source};
+use crate::record::{EventKind, LoopMembership, Record};
 
 /// Successive consistent fixes before the filter takes over: one may agree by chance.
 const FIXES_TO_SWITCH: u32 = 3;
@@ -19,19 +18,13 @@ impl<B: CorrelatorBank> Run<'_, B> {
     pub(super) fn consider_vector_tracking(
         &mut self,
         now: u64,
-        fix: Option<&(Solution, Source)>,
+        navigated: &Navigated,
     ) -> Result<(), ReceiverError> {
         let Some(settings) = &self.settings.vector else {
             return Ok(());
         };
         let exact = self.navigator.receive_time(now).is_some();
-        let consistent = fix.filter(|(solution, source)| {
-            exact
-                && *source == Source::LeastSquares
-                && solution.consistency == Consistency::Passed
-                && solution.velocity.is_some()
-        });
-        let Some((solution, _)) = consistent else {
+        let Some(solution) = navigated.consistent().filter(|_| exact) else {
             self.consistent_fixes = 0;
             return Ok(());
         };
@@ -39,14 +32,15 @@ impl<B: CorrelatorBank> Run<'_, B> {
         if self.consistent_fixes < FIXES_TO_SWITCH {
             return Ok(());
         }
-        let tracking = VectorTracking::start(now, solution, self.navigator.model(), settings)?;
-        if let Some(around) = surroundings(&self.navigator, now) {
-            tracking.steer(&around, &mut self.slots);
-            self.vector = Some(tracking);
-            let to = LoopMembership::Vector;
-            self.emit(now, None, EventKind::ModeSwitched { to })?;
-        }
-        Ok(())
+        let Some(around) = surroundings(&self.navigator, now) else {
+            return Ok(());
+        };
+        let model = self.navigator.model();
+        let tracking = VectorTracking::start(&around, solution, &navigated.raw, model, settings)?;
+        tracking.steer(&around, &mut self.slots);
+        self.vector = Some(tracking);
+        let to = LoopMembership::Vector;
+        self.emit(now, None, EventKind::ModeSwitched { to })
     }
 
     /// An epoch of vector tracking; its records are written where they are `due`.
@@ -63,10 +57,7 @@ impl<B: CorrelatorBank> Run<'_, B> {
             return self.leave_vector_tracking(now);
         };
         let model = self.navigator.model();
-        if model != *tracking.model() {
-            tracking.remodel(model)?;
-        }
-        let epoch = tracking.epoch(&around, &mut self.slots)?;
+        let epoch = tracking.epoch(&around, &model, &mut self.slots)?;
         self.navigator.follow(tracking.state());
         for (satellite, kind) in epoch.events.clone() {
             self.emit(now, satellite, kind)?;
@@ -139,7 +130,7 @@ impl<B: CorrelatorBank> Run<'_, B> {
 }
 
 /// What the channels of an epoch share; `None` before the clock is exact.
-fn surroundings(navigator: &super::navigator::Navigator, tick: u64) -> Option<Surroundings<'_>> {
+fn surroundings(navigator: &Navigator, tick: u64) -> Option<Surroundings<'_>> {
     Some(Surroundings {
         tick,
         receive_time: navigator.receive_time(tick)?,

@@ -12,14 +12,15 @@ use std::collections::BTreeMap;
 
 use fault_ml::InnovationTest;
 use gnss_nav::filter::{
-    Advice, BatchFilter, Disposition, EpochGeometry, FaultLogic, FaultThresholds, FilterSettings,
-    Innovations, NavFilter, Observable, SatelliteInnovation, SequentialFilter, SkipReason, Update,
+    Advice, BatchFilter, Covariance, Disposition, EpochGeometry, FaultLogic, FaultThresholds,
+    FilterSettings, Innovations, NavFilter, Observable, SatelliteInnovation, SequentialFilter,
+    SkipReason, Update,
 };
 use gnss_nav::measurement::form;
 use gnss_nav::prediction::Expected;
 use gnss_nav::{
-    EphemerisStore, GpsTime, MeasurementModel, NavState, RawMeasurement, SatelliteId, Solution,
-    least_squares,
+    EphemerisStore, GpsTime, Measurement, MeasurementModel, NavState, RawMeasurement, SatelliteId,
+    Solution, least_squares,
 };
 use gnss_signal::tracking::{ChannelEpoch, Lock};
 
@@ -101,25 +102,27 @@ pub(super) struct VectorTracking {
 }
 
 impl VectorTracking {
-    /// Starts from a solution of least squares at `tick`.
+    /// Starts from a solution of least squares of `raw`.
     ///
     /// # Errors
     /// Where the solution or the settings make no filter.
     pub(super) fn start(
-        tick: u64,
+        around: &Surroundings,
         solution: &Solution,
+        raw: &[RawMeasurement],
         model: MeasurementModel,
         settings: &VectorSettings,
     ) -> Result<Self, ReceiverError> {
         let monitor = settings.monitor.map(InnovationTest::new).transpose()?;
+        let measurements = form(around.receive_time, raw, around.store).measurements;
         Ok(Self {
-            filter: filter(solution, &model, settings)?,
+            filter: from_solution(solution, &measurements, &model, settings)?,
             model,
             monitor,
             faults: FaultLogic::new(FaultThresholds::default())?,
             watches: BTreeMap::new(),
             geometry: None,
-            tick,
+            tick: around.tick,
             fixed: solution.gps_time(),
             outlook: Outlook::Goes,
             settings: settings.clone(),
@@ -138,6 +141,7 @@ impl VectorTracking {
     pub(super) fn epoch(
         &mut self,
         around: &Surroundings,
+        model: &MeasurementModel,
         slots: &mut [Slot],
     ) -> Result<Epoch, ReceiverError> {
         let to = self.state().gps_time(around.receive_time);
@@ -147,7 +151,12 @@ impl VectorTracking {
         for slot in slots.iter_mut().filter(|s| s.channel.is_steered()) {
             epoch.members.extend(self.member(around, slot));
         }
-        self.update(around, &mut epoch)?;
+        let raw: Vec<RawMeasurement> = epoch.members.iter().filter_map(|m| m.raw).collect();
+        let measurements = form(around.receive_time, &raw, around.store).measurements;
+        if *model != self.model {
+            self.remodel(*model, &measurements)?;
+        }
+        self.update(&measurements, &mut epoch)?;
         self.steer(around, slots);
         Ok(epoch)
     }
@@ -193,22 +202,18 @@ impl VectorTracking {
         expected.ok()
     }
 
-    fn update(&mut self, around: &Surroundings, epoch: &mut Epoch) -> Result<(), ReceiverError> {
-        let raw: Vec<RawMeasurement> = epoch.members.iter().filter_map(|m| m.raw).collect();
-        let formed = form(around.receive_time, &raw, around.store);
-        let innovations = self.filter.innovations(&formed.measurements)?;
+    fn update(
+        &mut self,
+        measurements: &[Measurement],
+        epoch: &mut Epoch,
+    ) -> Result<(), ReceiverError> {
+        let innovations = self.filter.innovations(measurements)?;
         let dispositions = self.judge(&innovations, epoch)?;
         let update = self.filter.update(&innovations, &dispositions)?;
         self.note(&innovations, &dispositions, &update, epoch);
         match self.faults.observe(&innovations, &update) {
             Advice::Reset(channels) => {
-                let solution = least_squares::solve_with_exclusion(
-                    &formed.measurements,
-                    &self.model,
-                    &self.state().position_ecef_m.clone(),
-                    EXCLUSION_FALSE_ALARM,
-                );
-                self.reset(solution.ok(), channels.len(), epoch)?;
+                self.reset(measurements, channels.len(), epoch)?;
             }
             Advice::Nothing | Advice::Isolate(_) => {}
         }
@@ -283,20 +288,25 @@ impl VectorTracking {
     /// Starts anew from least squares where that is consistent.
     fn reset(
         &mut self,
-        solution: Option<Solution>,
+        measurements: &[Measurement],
         channels: usize,
         epoch: &mut Epoch,
     ) -> Result<(), ReceiverError> {
+        let solved = least_squares::solve_with_exclusion(
+            measurements,
+            &self.model,
+            &self.state().position_ecef_m,
+            EXCLUSION_FALSE_ALARM,
+        );
         self.faults.clear();
-        let consistent = solution.filter(|s| s.consistency == least_squares::Consistency::Passed);
-        let Some(solution) = consistent else {
+        let consistent = |s: &Solution| s.consistency == least_squares::Consistency::Passed;
+        let Some(solution) = solved.ok().filter(consistent) else {
             self.outlook = Outlook::Contradicted;
             return Ok(());
         };
-        epoch
-            .events
-            .push((None, EventKind::FilterReset { channels }));
-        self.filter = filter(&solution, &self.model, &self.settings)?;
+        let kind = EventKind::FilterReset { channels };
+        epoch.events.push((None, kind));
+        self.filter = from_solution(&solution, measurements, &self.model, &self.settings)?;
         self.watches.clear();
         Ok(())
     }
@@ -306,49 +316,63 @@ impl VectorTracking {
         self.state().time - self.fixed < STALE_S
     }
 
-    /// Takes another model of the delays: what the old one may have been wrong by is no longer known.
-    ///
-    /// # Errors
-    /// Where the state makes no filter.
-    pub(super) fn remodel(&mut self, model: MeasurementModel) -> Result<(), ReceiverError> {
+    /// Takes another model of the delays, and moves to where it puts the same pseudoranges.
+    fn remodel(
+        &mut self,
+        model: MeasurementModel,
+        measurements: &[Measurement],
+    ) -> Result<(), ReceiverError> {
         let covariance = self.filter.covariance();
-        let wider = self
-            .geometry
-            .map_or(covariance, |g| g.with_lasting(&covariance));
+        let before = self.filter.innovations(measurements)?;
         self.model = model;
-        let settings = filter_settings(&model, &self.settings);
-        let state = *self.state();
-        self.filter = match self.settings.filter {
-            FilterKind::Batch => Box::new(BatchFilter::new(state, wider, settings)?),
-            FilterKind::Sequential => Box::new(SequentialFilter::new(state, wider, settings)?),
-        };
+        self.filter = filter(*self.state(), covariance, &model, &self.settings)?;
+        if let Ok(shift) = self.filter.innovations(measurements)?.shift_from(&before) {
+            let mut state = *self.state();
+            state.position_ecef_m += shift.xyz();
+            state.clock_bias_m += shift.w;
+            self.filter = filter(state, covariance, &model, &self.settings)?;
+        }
         Ok(())
-    }
-
-    /// The model of delays in use.
-    pub(super) const fn model(&self) -> &MeasurementModel {
-        &self.model
     }
 }
 
+/// A filter that knows `state` with `covariance`.
 fn filter(
-    solution: &Solution,
+    state: NavState,
+    covariance: Covariance,
     model: &MeasurementModel,
     settings: &VectorSettings,
 ) -> Result<Box<dyn NavFilter>, ReceiverError> {
-    let filter_settings = filter_settings(model, settings);
+    let filter_settings = FilterSettings {
+        process_noise: settings.process_noise,
+        model: *model,
+        gate: settings.gate,
+    };
     Ok(match settings.filter {
-        FilterKind::Batch => Box::new(BatchFilter::from_solution(solution, filter_settings)?),
+        FilterKind::Batch => Box::new(BatchFilter::new(state, covariance, filter_settings)?),
         FilterKind::Sequential => {
-            Box::new(SequentialFilter::from_solution(solution, filter_settings)?)
+            Box::new(SequentialFilter::new(state, covariance, filter_settings)?)
         }
     })
 }
 
-fn filter_settings(model: &MeasurementModel, settings: &VectorSettings) -> FilterSettings {
-    FilterSettings {
-        process_noise: settings.process_noise,
+/// A filter that starts where least squares of `measurements` ended.
+///
+/// What lasts of their errors is not for the filter to average away: it starts with what tracking noise
+/// made of the solution.
+fn from_solution(
+    solution: &Solution,
+    measurements: &[Measurement],
+    model: &MeasurementModel,
+    settings: &VectorSettings,
+) -> Result<Box<dyn NavFilter>, ReceiverError> {
+    let filter_settings = FilterSettings {
         model: *model,
-        gate: settings.gate,
-    }
+        ..FilterSettings::default()
+    };
+    let start = SequentialFilter::from_solution(solution, filter_settings)?;
+    let used = |satellite| solution.satellites.iter().any(|s| s.satellite == satellite);
+    let geometry = start.innovations(measurements)?.geometry(used)?;
+    let own = geometry.with_noise_alone(&start.covariance());
+    filter(*start.state(), own, model, settings)
 }
