@@ -6,3 +6,4 @@ pub mod demo;
 pub mod reproduce;
 pub mod scenario;
 pub mod tidy;
+pub mod validate;

@@ -12,6 +12,7 @@ use xtask::demo::demo;
 use xtask::reproduce::{Paper, reproduce};
 use xtask::scenario::command::{self as scenario, Command};
 use xtask::tidy::{Severity, tidy, workspace_root};
+use xtask::validate::front_ends;
 
 #[derive(Debug, Parser)]
 #[command(
@@ -56,6 +57,9 @@ enum Task {
         #[arg(long, value_name = "HZ")]
         code_bandwidth: Option<f64>,
     },
+    /// Experiments on the generator of signals that take minutes: tables with a verdict
+    #[command(subcommand)]
+    Validate(Validation),
     /// Repeat the experiments of a paper: summary.json, report.md and pictures.
     Reproduce {
         /// Which paper.
@@ -69,6 +73,22 @@ enum Task {
     Tidy,
     /// Run every check of the tree, as .ci/run does.
     Ci,
+}
+
+#[derive(Debug, Subcommand)]
+enum Validation {
+    /// The receiver, alone, on `static-open-sky` at four sample rates in 1, 2 and 8 bits
+    FrontEnds {
+        /// Signal of each run, s
+        #[arg(long, value_name = "S", default_value_t = 60.0)]
+        duration: f64,
+        /// Seed in place of the scenario's
+        #[arg(long, value_name = "N")]
+        seed: Option<u64>,
+        /// Folder of what the receiver writes
+        #[arg(long, value_name = "DIR", default_value = "target/front-ends")]
+        out: PathBuf,
+    },
 }
 
 fn main() -> ExitCode {
@@ -87,6 +107,20 @@ const fn verdict(holds: bool) -> ExitCode {
         ExitCode::SUCCESS
     } else {
         ExitCode::FAILURE
+    }
+}
+
+fn validate(validation: &Validation, out: &mut impl Write) -> Result<ExitCode> {
+    match validation {
+        Validation::FrontEnds {
+            duration,
+            seed,
+            out: folder,
+        } => {
+            let table = front_ends::table(*duration, *seed, folder)?;
+            writeln!(out, "{table}")?;
+            Ok(verdict(table.holds()))
+        }
     }
 }
 
@@ -123,6 +157,7 @@ fn perform(task: Task) -> Result<ExitCode> {
             writeln!(out, "{}", code_noise::table(&experiment)?)?;
             Ok(ExitCode::SUCCESS)
         }
+        Task::Validate(validation) => validate(&validation, &mut out),
         Task::Reproduce { paper, out: folder } => {
             let outcome = reproduce(paper, &folder)?;
             writeln!(out, "{outcome}")?;

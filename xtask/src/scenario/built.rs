@@ -185,6 +185,7 @@ impl Scenario {
                 .elevation_rad(0.0)
                 .max(link.elevation_rad(self.duration_s));
             match &constellation.choice {
+                Choice::Above(_) if ephemeris.health != 0 => continue,
                 Choice::Above(mask_rad) if elevation_rad < *mask_rad => continue,
                 Choice::Named(_) if elevation_rad < horizon_rad => {
                     let what = format!(

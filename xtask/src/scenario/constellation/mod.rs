@@ -79,9 +79,9 @@ enum Source {
 /// Which satellites are heard.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Choice {
-    /// Exactly these.
+    /// Exactly these, healthy or not.
     Named(Vec<SatelliteId>),
-    /// All that stand above this elevation, rad.
+    /// All healthy ones that stand above this elevation, rad.
     Above(f64),
 }
 
@@ -149,7 +149,7 @@ fn from_rinex(path: &Path, start: GpsTime) -> Result<(Vec<Ephemeris>, Option<Klo
     let mut chosen = Vec::new();
     for satellite in file.satellites() {
         let own = file.ephemerides.iter().filter(|e| e.satellite == satellite);
-        let valid = own.filter(|e| e.is_valid_at(start) && e.health == 0);
+        let valid = own.filter(|e| e.is_valid_at(start));
         let nearest = valid.min_by(|a, b| {
             let age_s = |e: &Ephemeris| (e.toe - start).abs();
             age_s(a).total_cmp(&age_s(b))
@@ -161,7 +161,7 @@ fn from_rinex(path: &Path, start: GpsTime) -> Result<(Vec<Ephemeris>, Option<Klo
     }
     ensure!(
         !chosen.is_empty(),
-        "{}: no healthy satellite has an ephemeris that is valid at the start, week {} {} s",
+        "{}: no satellite has an ephemeris that is valid at the start, week {} {} s",
         path.display(),
         start.week(),
         start.tow_s()

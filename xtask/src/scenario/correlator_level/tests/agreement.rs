@@ -2,16 +2,22 @@
 
 use gnss_signal::sample::SampleFormat;
 use gnss_signal::{CorrelatorBank, IfCorrelatorBank, InstructionSet, Replica, TapOffsets, Taps};
+use nalgebra::{SMatrix, SVector};
 use num_complex::Complex64;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::support::{Mismatch, Reflection, TestEmitter, lnav, path, reception, replica, scene};
 use crate::scenario::antenna::{Gap, Reception, Scene};
 use crate::scenario::correlator_level::CorrelatorLevelBank;
+use crate::scenario::correlator_level::noise::complex_normal;
 use crate::scenario::if_signal::Synthesiser;
 use crate::scenario::message::Message;
 use crate::scenario::path::UniformPath;
 
-const TAPS_CHIPS: [f64; 4] = [-0.5, -0.25, 0.0, 0.4];
+const TAPS: usize = 4;
+const TAPS_CHIPS: [f64; TAPS] = [-0.5, -0.25, 0.0, 0.4];
 
 fn taps() -> TapOffsets {
     TapOffsets::new(&TAPS_CHIPS).unwrap()
@@ -63,58 +69,51 @@ fn both(scene: impl Fn() -> Scene, replicas: &[Replica]) -> Both {
     }
 }
 
+type Vector = SVector<Complex64, TAPS>;
+type Matrix = SMatrix<Complex64, TAPS, TAPS>;
+
 /// Mean of each tap, and covariance of all pairs.
-fn moments(sums: &[Vec<Complex64>]) -> (Vec<Complex64>, Vec<Vec<Complex64>>) {
-    let (n, taps) = (sums.len() as f64, sums[0].len());
-    let mean: Vec<Complex64> = (0..taps)
-        .map(|t| sums.iter().map(|s| s[t]).sum::<Complex64>() / n)
-        .collect();
-    let covariance = |a: usize, b: usize| -> Complex64 {
-        let products = sums
-            .iter()
-            .map(|s| (s[a] - mean[a]) * (s[b] - mean[b]).conj());
-        products.sum::<Complex64>() / (n - 1.0)
-    };
-    let matrix = (0..taps).map(|a| (0..taps).map(|b| covariance(a, b)).collect());
-    (mean.clone(), matrix.collect())
+fn moments(sums: &[Vec<Complex64>]) -> (Vector, Matrix) {
+    let n = sums.len() as f64;
+    let vectors: Vec<Vector> = sums.iter().map(|s| Vector::from_column_slice(s)).collect();
+    let mean = vectors.iter().sum::<Vector>() / Complex64::from(n);
+    let products = vectors.iter().map(|v| (v - mean) * (v - mean).adjoint());
+    (mean, products.sum::<Matrix>() / Complex64::from(n - 1.0))
 }
 
-/// Differences of all moments over their standard errors.
-fn deviations(both: &Both) -> Vec<(String, f64)> {
-    let n = both.drawn.len() as f64;
-    let (mean_a, cov_a) = moments(&both.drawn);
-    let (mean_b, cov_b) = moments(&both.sampled);
-    let mut all = Vec::new();
-    for a in 0..mean_a.len() {
-        // Each part of a mean has half of the variance of the sum over n, twice for two banks.
-        let error = (0.5 * (cov_a[a][a].re + cov_b[a][a].re) / n).sqrt();
-        let difference = (mean_a[a] - mean_b[a]) / error;
-        all.push((format!("mean re {a}"), difference.re));
-        all.push((format!("mean im {a}"), difference.im));
-        for b in 0..=a {
-            // Moments of complex Gaussians: var Re = (saa sbb + Re(sab)^2 - Im(sab)^2) / 2n.
-            let error = |c: &[Vec<Complex64>]| {
-                let product = c[a][a].re * c[b][b].re;
-                (product + c[a][b].re.powi(2) - c[a][b].im.powi(2)) / (2.0 * n)
-            };
-            let error = (error(&cov_a) + error(&cov_b)).sqrt();
-            let difference = (cov_a[a][b].re - cov_b[a][b].re) / error;
-            all.push((format!("covariance {a} {b}"), difference));
-        }
-    }
-    all
+/// What two sets of complex Gaussian vectors differ in, as chi-squares: their means (two degrees of
+/// freedom a tap) and their covariances, real and imaginary parts (the square of the taps).
+///
+/// The second is twice the logarithm of the likelihood ratio of one covariance against two; the
+/// terms beyond the chi-square are below 1 % with 400 vectors.
+fn differences(a: &[Vec<Complex64>], b: &[Vec<Complex64>]) -> [f64; 2] {
+    let n = a.len() as f64;
+    let ((mean_a, cov_a), (mean_b, cov_b)) = (moments(a), moments(b));
+    let both = cov_a + cov_b;
+    let difference = mean_a - mean_b;
+    let weighted = both.lu().solve(&difference).unwrap();
+    let means = 2.0 * n * difference.dotc(&weighted).re;
+    let log_determinant = |matrix: &Matrix| matrix.determinant().re.ln();
+    let pooled = both / Complex64::from(2.0);
+    let ratio = 2.0 * log_determinant(&pooled) - log_determinant(&cov_a) - log_determinant(&cov_b);
+    [means, 2.0 * (n - 1.0) * ratio]
 }
 
-/// Three standard errors for a case as a whole: 3.8 for each of its 18 quantities.
-const LIMIT: f64 = 3.8;
+/// What a chi-square exceeds as seldom as a normal number leaves three standard errors.
+fn three_standard_errors(degrees: usize) -> f64 {
+    let distribution = ChiSquared::new(degrees as f64).unwrap();
+    distribution.inverse_cdf(0.997_300_2)
+}
 
+/// Means, variances and correlations within three standard errors, jointly: each of two dozen
+/// by itself would leave them in one case of sixteen.
 fn assert_agreement(name: &str, both: &Both) {
-    for (quantity, deviation) in deviations(both) {
-        assert!(
-            deviation.abs() < LIMIT,
-            "{name}: {quantity} is {deviation} standard errors off"
-        );
-    }
+    let [means, covariances] = differences(&both.drawn, &both.sampled);
+    let limit = three_standard_errors(2 * TAPS + TAPS * TAPS);
+    assert!(
+        means + covariances < limit,
+        "{name}: chi-squares {means} of means, {covariances} of covariances; limit {limit}"
+    );
     // The mean of N squares of nearly Gaussian numbers errs by 1.5 / sqrt(N), twice.
     let [p, q] = both.powers;
     let error = 3.0 * 1.5 * 2f64.sqrt() / both.samples.sqrt();
@@ -122,6 +121,27 @@ fn assert_agreement(name: &str, both: &Both) {
         (p / q - 1.0).abs() < error.max(1e-4),
         "{name}: sample power {p} and {q}"
     );
+}
+
+#[test]
+fn differences_are_those_of_their_definition() {
+    let mut random = ChaCha8Rng::seed_from_u64(3);
+    let mut draw = |gain: f64, shift: f64, turn: Complex64| -> Vec<Vec<Complex64>> {
+        let mut one = || {
+            let z: [Complex64; TAPS] = std::array::from_fn(|_| complex_normal(&mut random));
+            vec![gain * z[0] + shift, z[1], z[2] + turn * z[1], z[3]]
+        };
+        (0..400).map(|_| one()).collect()
+    };
+    let plain = draw(1.0, 0.0, Complex64::ZERO);
+    let limit = three_standard_errors(TAPS * TAPS);
+    let [means, covariances] = differences(&plain, &draw(1.0, 0.0, Complex64::ZERO));
+    assert!(means < three_standard_errors(2 * TAPS) && covariances < limit);
+    // Half a deviation of a mean is seven of its standard errors; 1.5 dB of power and an
+    // imaginary correlation of 0.3 are five and six.
+    assert!(differences(&plain, &draw(1.0, 0.5, Complex64::ZERO))[0] > 40.0);
+    assert!(differences(&plain, &draw(1.19, 0.0, Complex64::ZERO))[1] > limit);
+    assert!(differences(&plain, &draw(1.0, 0.0, 0.3 * Complex64::I))[1] > limit);
 }
 
 /// Replicas one after the other, each `periods` of a millisecond, all with the same mismatch.
@@ -274,7 +294,7 @@ fn whole_samples_in_a_chip_agree() {
 /// Each sum against the same of samples: all differences are noise of both.
 fn assert_same_signal(name: &str, both: &Both, noise: f64) {
     let pairs = both.drawn.iter().zip(&both.sampled);
-    for tap in 0..TAPS_CHIPS.len() {
+    for tap in 0..TAPS {
         let squares: f64 = pairs
             .clone()
             .map(|(a, b)| (a[tap] - b[tap]).norm_sqr())
