@@ -20,7 +20,8 @@ const STEPS: usize = 200;
 /// the direct one.
 #[must_use]
 pub fn tracking_error_chips(rays: &[Ray]) -> f64 {
-    let Some(direct) = rays.first() else {
+    // A signal by itself has no error.
+    let [direct, _, ..] = rays else {
         return 0.0;
     };
     let relative: Vec<(Complex64, f64)> = rays
@@ -47,7 +48,11 @@ pub fn tracking_error_chips(rays: &[Ray]) -> f64 {
         if early + late <= 0.0 {
             break;
         }
-        late_chips -= (early - late) / (early + late) / 3.0;
+        let next = late_chips - (early - late) / (early + late) / 3.0;
+        if next == late_chips {
+            break;
+        }
+        late_chips = next;
     }
     late_chips
 }

@@ -5,9 +5,9 @@ use std::path::Path;
 use anyhow::Result;
 use gnss_nav::constants::SPEED_OF_LIGHT_MPS;
 use receiver::record::{IonosphereUtcRecord, Record};
-use receiver::sink::EventSink;
 use receiver::sink::file::OutputFile;
 use receiver::sink::navigation::NavigationRinex;
+use receiver::sink::{EventSink, Fixed};
 
 use super::antenna::Emitter;
 use super::built::Scenario;
@@ -53,8 +53,16 @@ fn receiver_truth(scenario: &Scenario, directory: &Path) -> Result<()> {
         let (p, v) = (motion.position_ecef_m, motion.velocity_ecef_mps);
         writeln!(
             file,
-            "{time_s:.6},{:.4},{:.4},{:.4},{:.5},{:.5},{:.5},{bias_m:.4},{drift_mps:.5}",
-            p.x, p.y, p.z, v.x, v.y, v.z
+            "{},{},{},{},{},{},{},{},{}",
+            Fixed(time_s, 6),
+            Fixed(p.x, 4),
+            Fixed(p.y, 4),
+            Fixed(p.z, 4),
+            Fixed(v.x, 5),
+            Fixed(v.y, 5),
+            Fixed(v.z, 5),
+            Fixed(bias_m, 4),
+            Fixed(drift_mps, 5),
         )?;
     }
     Ok(file.commit()?)
@@ -84,20 +92,25 @@ fn satellites(scenario: &Scenario, directory: &Path) -> Result<()> {
             satellite.rays(elapsed_s, elapsed_s, &mut rays)?;
             write!(
                 file,
-                "{time_s:.6},{},{},{:.3},{:.3},{:.4},{:.6},{:.4},",
+                "{},{},{},{},{},{},{},{},",
+                Fixed(time_s, 6),
                 heard.satellite,
                 heard.satellite.prn,
-                look.azimuth_rad.to_degrees(),
-                look.elevation_rad.to_degrees(),
-                SPEED_OF_LIGHT_MPS * (received - code_time),
-                (code_time.fraction_s() * CODE_RATE_HZ).rem_euclid(CODE_CHIPS),
-                satellite.doppler_hz(elapsed_s),
+                Fixed(look.azimuth_rad.to_degrees(), 3),
+                Fixed(look.elevation_rad.to_degrees(), 3),
+                Fixed(SPEED_OF_LIGHT_MPS * (received - code_time), 4),
+                Fixed(
+                    (code_time.fraction_s() * CODE_RATE_HZ).rem_euclid(CODE_CHIPS),
+                    6
+                ),
+                Fixed(satellite.doppler_hz(elapsed_s), 4),
             )?;
             match satellite.cn0_dbhz(elapsed_s) {
                 Some(cn0_dbhz) => writeln!(
                     file,
-                    "{cn0_dbhz:.3},{:.4}",
-                    CHIP_M * tracking_error_chips(&rays)
+                    "{},{}",
+                    Fixed(cn0_dbhz, 3),
+                    Fixed(CHIP_M * tracking_error_chips(&rays), 4)
                 )?,
                 None => writeln!(file, ",")?,
             }

@@ -6,6 +6,7 @@ use gnss_nav::Geodetic;
 
 use super::EventSink;
 use super::file::OutputFile;
+use super::text::Fixed;
 use crate::ReceiverError;
 use crate::record::{PvtRecord, Record, Status};
 
@@ -105,10 +106,10 @@ impl EventSink for TrackKml {
 
 fn coordinates(place: &Geodetic) -> String {
     format!(
-        "{:.9},{:.9},{:.3}",
-        place.lon_rad.to_degrees(),
-        place.lat_rad.to_degrees(),
-        place.height_m
+        "{},{},{}",
+        Fixed(place.lon_rad.to_degrees(), 9),
+        Fixed(place.lat_rad.to_degrees(), 9),
+        Fixed(place.height_m, 3)
     )
 }
 

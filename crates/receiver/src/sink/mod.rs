@@ -20,6 +20,7 @@ mod text;
 use crate::ReceiverError;
 use crate::record::Record;
 
+pub use text::Fixed;
 pub(crate) use text::rounded;
 
 /// Writes records to one place.

@@ -9,6 +9,7 @@ use super::EventSink;
 use super::calendar::{Calendar, leap_seconds, on_grid};
 use super::file::OutputFile;
 use super::rinex_header::{Kind, header_line, program_line, version_line};
+use super::text::Fixed;
 use crate::ReceiverError;
 use crate::record::{Observation, ObservationEpoch, Record, Status};
 
@@ -166,8 +167,8 @@ fn line(observation: &Observation) -> String {
 
 /// A number in 14 columns, or blanks where it does not fit or is none.
 fn value(number: f64) -> String {
-    let text = format!("{number:14.3}");
-    if number.is_finite() && text.len() == 14 {
+    let text = format!("{:>14}", Fixed(number, 3));
+    if text.len() == 14 {
         text
     } else {
         " ".repeat(14)

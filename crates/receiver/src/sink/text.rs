@@ -4,16 +4,64 @@ use std::fmt;
 
 /// A number with a fixed number of decimals; displays as nothing where it is not finite.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Fixed(pub(crate) f64, pub(crate) usize);
+pub struct Fixed(
+    /// The number.
+    pub f64,
+    /// Digits after the point.
+    pub usize,
+);
 
 impl fmt::Display for Fixed {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if self.0.is_finite() {
-            write!(f, "{:.*}", self.1, self.0)
-        } else {
-            Ok(())
+        let Self(value, decimals) = *self;
+        if !value.is_finite() {
+            return Ok(());
+        }
+        let mut text = [0; MOST_DIGITS];
+        match digits(value, decimals, &mut text) {
+            Some(text) => f.pad(text),
+            None => f.pad(&format!("{value:.decimals$}")),
         }
     }
+}
+
+/// Characters of a number below 2^53 with sign and point.
+const MOST_DIGITS: usize = 24;
+const POWERS_OF_TEN: [f64; 13] = [
+    1.0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12,
+];
+
+/// What `{value:.decimals$}` gives, written from the end of `text` on; none where double precision
+/// cannot tell which way the last digit is rounded.
+fn digits(value: f64, decimals: usize, text: &mut [u8; MOST_DIGITS]) -> Option<&str> {
+    let scaled = value.abs() * POWERS_OF_TEN.get(decimals)?;
+    let whole = scaled.floor();
+    let rest = scaled - whole;
+    // The product is rounded to 2^-53 of itself, which leaves the rest of smaller numbers this far
+    // from where rounding turns.
+    if scaled >= 1e15 || (rest - 0.5).abs() <= scaled * f64::EPSILON {
+        return None;
+    }
+    let mut left = whole as u64 + u64::from(rest > 0.5);
+    let mut at = MOST_DIGITS;
+    let mut put = |character: u8| {
+        at -= 1;
+        text[at] = character;
+    };
+    for place in 0.. {
+        if place > decimals && left == 0 {
+            break;
+        }
+        if place == decimals && decimals > 0 {
+            put(b'.');
+        }
+        put(b'0' + (left % 10) as u8);
+        left /= 10;
+    }
+    if value.is_sign_negative() {
+        put(b'-');
+    }
+    std::str::from_utf8(&text[at..]).ok()
 }
 
 /// `value` with `decimals`, or nothing.
@@ -43,6 +91,8 @@ pub(crate) fn scientific(value: f64, width: usize, decimals: usize) -> String {
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
 
     #[test]
@@ -53,6 +103,38 @@ mod tests {
         assert_eq!(optional(None, 3).to_string(), "");
         assert_eq!(rounded(-0.0001, 2).to_string(), "0");
         assert!((rounded(12.345_678, 3) - 12.346).abs() < f64::EPSILON * 12.0);
+    }
+
+    proptest! {
+        #[test]
+        fn fixed_decimals_are_those_of_the_standard_library(
+            mantissa in -1_000_000_000_i64..1_000_000_000,
+            exponent in -14_i32..8,
+            decimals in 0_usize..13,
+        ) {
+            // Short decimals, which often end in the 5 at which rounding turns.
+            let value = mantissa as f64 * 10f64.powi(exponent);
+            prop_assert_eq!(Fixed(value, decimals).to_string(), format!("{value:.decimals$}"));
+        }
+
+        #[test]
+        fn any_number_is_that_of_the_standard_library(value: f64, decimals in 0_usize..15) {
+            prop_assert_eq!(Fixed(value, decimals).to_string(), format!("{value:.decimals$}"));
+        }
+    }
+
+    #[test]
+    fn halves_zeros_and_widths_are_those_of_the_standard_library() {
+        for value in [
+            0.0, -0.0, 0.5, 1.5, 2.5, -0.125, 0.375, 1e15, 9.999_999, -0.04, 4.35,
+        ] {
+            for decimals in 0..4 {
+                let expected = format!("{value:.decimals$}");
+                assert_eq!(Fixed(value, decimals).to_string(), expected);
+                let expected = format!("{value:14.decimals$}");
+                assert_eq!(format!("{:>14}", Fixed(value, decimals)), expected);
+            }
+        }
     }
 
     #[test]

@@ -35,6 +35,8 @@ pub struct CorrelatorLevelBank {
     pub(super) model: FrontEndModel,
     pub(super) tracks: Vec<RayTracks>,
     pub(super) seed: ChaCha8Rng,
+    /// What the acquisition engine's own filter leaves of a signal; none: nobody searched yet.
+    pub(super) band_gain: Option<f64>,
     interferers: Vec<Interferer>,
     level: Level,
     codes: Vec<Option<Box<Code>>>,
@@ -90,6 +92,7 @@ impl CorrelatorLevelBank {
             model,
             tracks,
             seed: seeded(scene.seed),
+            band_gain: None,
             codes: Vec::new(),
             powers: vec![(i64::MIN, 0.0); POWERS],
             newest_tick: 0,

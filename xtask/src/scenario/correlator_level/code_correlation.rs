@@ -125,14 +125,31 @@ impl CodeCorrelation {
 /// Values at whole chips, of which the first is 1.
 fn side_lobes(signal: SignalId) -> Vec<f64> {
     let code = ranging_code(signal);
-    let at = |lag: usize| -> i32 {
-        (0..LENGTH)
-            .map(|n| i32::from(code[n]) * i32::from(code[(n + lag) % LENGTH]))
-            .sum()
-    };
+    let mut signs = [0_u64; 2 * SIGN_WORDS + 1];
+    for n in 0..2 * LENGTH {
+        signs[n / 64] |= u64::from(code[n % LENGTH] < 0) << (n % 64);
+    }
     (0..LENGTH)
-        .map(|lag| f64::from(at(lag)) / LENGTH as f64)
+        .map(|lag| f64::from(at_lag(&signs, lag)) / LENGTH as f64)
         .collect()
+}
+
+/// 64-bit words that hold the signs of a code period.
+const SIGN_WORDS: usize = LENGTH.div_ceil(64);
+
+/// Sum of the products of a code with itself `lag` chips on, from the signs of two periods: chips
+/// less twice the number of signs that differ.
+fn at_lag(signs: &[u64; 2 * SIGN_WORDS + 1], lag: usize) -> i32 {
+    let (word, bit) = (lag / 64, lag % 64);
+    let different: u32 = (0..SIGN_WORDS)
+        .map(|k| {
+            let pair = u128::from(signs[word + k + 1]) << 64 | u128::from(signs[word + k]);
+            let left = LENGTH - 64 * k;
+            let mask = if left < 64 { (1 << left) - 1 } else { u64::MAX };
+            (((pair >> bit) as u64 ^ signs[k]) & mask).count_ones()
+        })
+        .sum();
+    LENGTH as i32 - 2 * different as i32
 }
 
 fn near_peak(at_chips: &[f64], lobe: &Lobe) -> Vec<f32> {
@@ -170,6 +187,19 @@ mod tests {
             assert!((correlation.at(-0.3) - expected).abs() < 1e-6);
             assert!((correlation.at(1023.3) - expected).abs() < 1e-6);
             assert!((correlation.at(-1022.7) - expected).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn side_lobes_are_the_sums_of_products() {
+        for n in [1, 19, 32] {
+            let code = ranging_code(prn(n));
+            let found = side_lobes(prn(n));
+            for lag in [0, 1, 63, 64, 65, 511, 960, 1022] {
+                let products =
+                    (0..LENGTH).map(|k| i32::from(code[k]) * i32::from(code[(k + lag) % LENGTH]));
+                assert_eq!(found[lag], f64::from(products.sum::<i32>()) / 1023.0);
+            }
         }
     }
 

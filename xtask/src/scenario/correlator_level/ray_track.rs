@@ -94,7 +94,10 @@ pub(super) struct RayTracks {
     pub(super) signal: SignalId,
     emitter: Box<dyn Emitter>,
     stretches: Vec<Stretch>,
+    /// Rays at the beginning, middle and end of the segment made last.
     nodes: [Vec<Ray>; 3],
+    /// Where that ended; none: at an edge, or nothing was made.
+    continues_s: Option<f64>,
 }
 
 impl RayTracks {
@@ -104,6 +107,7 @@ impl RayTracks {
             emitter,
             stretches: vec![Stretch::default(); HELD],
             nodes: Default::default(),
+            continues_s: None,
         }
     }
 
@@ -157,9 +161,19 @@ impl RayTracks {
 
     fn fill_segment(&mut self, segment: &mut Segment, begin_s: f64, end_s: f64) -> Result<()> {
         let (middle_s, half_s) = (0.5 * (begin_s + end_s), 0.5 * (end_s - begin_s));
-        for (node, at_s) in self.nodes.iter_mut().zip([begin_s, middle_s, end_s]) {
+        // A segment begins with what the one before ended with, where there is no edge.
+        let known = usize::from(self.continues_s == Some(begin_s));
+        self.continues_s = None;
+        if known > 0 {
+            self.nodes.swap(0, 2);
+        }
+        let nodes = self.nodes.iter_mut().zip([begin_s, middle_s, end_s]);
+        for (node, at_s) in nodes.skip(known) {
             node.clear();
             self.emitter.rays(at_s, middle_s, node)?;
+        }
+        if self.next_edge_s(begin_s) > end_s {
+            self.continues_s = Some(end_s);
         }
         let [before, middle, after] = &self.nodes;
         ensure!(

@@ -15,6 +15,7 @@
 //! that drops hits which may be that is applied.
 
 use std::f64::consts::TAU;
+use std::sync::LazyLock;
 
 use anyhow::Result;
 use gnss_signal::{
@@ -58,8 +59,7 @@ impl CorrelatorLevelBank {
     ) -> Result<SearchReport, SignalError> {
         let needed = AcquisitionEngine::samples_needed(self.front_end, request).min(held);
         let statistics = AcquisitionEngine::statistics(self.front_end, request, needed as usize)?;
-        let band_gain = AcquisitionEngine::new(self.front_end)?.band_gain();
-        let correlation = band_limited();
+        let band_gain = self.band_gain()?;
         let mut report = SearchReport {
             hits: Vec::new(),
             best_missed: None,
@@ -70,7 +70,6 @@ impl CorrelatorLevelBank {
                 request,
                 statistics: &statistics,
                 band_gain,
-                correlation: &correlation,
                 signal: *signal,
             };
             let best = search.best(self).map_err(unreadable)?;
@@ -84,6 +83,16 @@ impl CorrelatorLevelBank {
         report.hits.sort_by_key(|hit| hit.signal);
         Ok(report)
     }
+
+    /// Gain of the engine's front end, which is asked for once.
+    fn band_gain(&mut self) -> Result<f64, SignalError> {
+        if let Some(gain) = self.band_gain {
+            return Ok(gain);
+        }
+        let gain = AcquisitionEngine::new(self.front_end)?.band_gain();
+        self.band_gain = Some(gain);
+        Ok(gain)
+    }
 }
 
 /// The search for one signal.
@@ -91,7 +100,6 @@ struct Search<'a> {
     request: &'a SearchRequest,
     statistics: &'a SearchStatistics,
     band_gain: f64,
-    correlation: &'a CodeCorrelation,
     signal: SignalId,
 }
 
@@ -245,7 +253,7 @@ impl Search<'_> {
             let sum = SignalSum {
                 timeline: &bank.timeline,
                 replica: &replica,
-                correlation: self.correlation,
+                correlation: &BAND_LIMITED,
                 taps_chips: &taps,
                 signal_grid: None,
                 intermediate_frequency_hz: bank.front_end.intermediate_frequency_hz,
@@ -316,6 +324,8 @@ fn upper_quantile(sums: u32, above: f64) -> f64 {
 }
 
 /// The peak of the code's autocorrelation cut to the band of the search.
+static BAND_LIMITED: LazyLock<CodeCorrelation> = LazyLock::new(band_limited);
+
 fn band_limited() -> CodeCorrelation {
     const STEPS: u32 = 200;
     let weight = |x: f64| {
