@@ -3,6 +3,7 @@
 pub mod ci;
 pub mod code_noise;
 pub mod demo;
+pub mod judged;
 pub mod reproduce;
 pub mod scenario;
 pub mod tidy;

@@ -5,7 +5,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
-use gnss_nav::Geodetic;
+use gnss_nav::{Geodetic, GpsTime};
 use gnss_signal::Signal;
 use gnss_signal::sample::{SampleDescription, SampleSource};
 use receiver::sink::file::{OutputFile, create_directory};
@@ -76,30 +76,38 @@ pub fn options(scenario: &Scenario) -> Table {
     }
     if scenario.receiver.assisted {
         set("nav", "navigation.rnx".into());
-        set("position", rough_position(scenario).into());
-        set("time", rough_time(scenario).into());
+        let place = rough_place(scenario);
+        let degrees = [place.lat_rad, place.lon_rad].map(f64::to_degrees);
+        let place = format!("{:.1},{:.1},{:.0}", degrees[0], degrees[1], place.height_m);
+        set("position", place.into());
+        let time = rough_time(scenario);
+        set(
+            "time",
+            format!("{}:{:.0}", time.week(), time.tow_s()).into(),
+        );
     }
     table.extend(scenario.receiver.options.clone());
     table
 }
 
 /// Where the receiver is, to a tenth of a degree.
-fn rough_position(scenario: &Scenario) -> String {
+#[must_use]
+pub fn rough_place(scenario: &Scenario) -> Geodetic {
     let place = Geodetic::from_ecef(&scenario.truth.trajectory.at(0.0).position_ecef_m);
     let round = |value: f64, step: f64| (value / step).round() * step;
-    format!(
-        "{:.1},{:.1},{:.0}",
+    Geodetic::from_degrees(
         round(place.lat_rad.to_degrees(), ROUGH_DEG),
         round(place.lon_rad.to_degrees(), ROUGH_DEG),
-        round(place.height_m, ROUGH_HEIGHT_M)
+        round(place.height_m, ROUGH_HEIGHT_M),
     )
 }
 
 /// When it starts, to ten seconds.
-fn rough_time(scenario: &Scenario) -> String {
+#[must_use]
+pub fn rough_time(scenario: &Scenario) -> GpsTime {
     let start = scenario.truth.start;
     let tow_s = (start.tow_s() / ROUGH_TIME_S).floor() * ROUGH_TIME_S;
-    format!("{}:{tow_s:.0}", start.week())
+    GpsTime::from_parts(start.week(), tow_s as i64, 0.0)
 }
 
 fn samples(scenario: &Scenario, folder: &Path) -> Result<()> {
