@@ -194,6 +194,15 @@ impl Channel {
         }
     }
 
+    /// Smoothed C/N0, dB-Hz, once the bit boundaries are known.
+    #[must_use]
+    pub fn cn0_dbhz(&self) -> Option<f64> {
+        match &self.stage {
+            Stage::Steady(s) => Some(s.cn0_dbhz()),
+            Stage::PullIn(_) | Stage::Lost(..) => None,
+        }
+    }
+
     /// Whether the signal stands well out of the noise of one integration, or did until now.
     #[must_use]
     pub fn is_strong(&self) -> bool {
@@ -401,6 +410,7 @@ impl PullIn {
             code_variance_chips2: code_variance_chips2(cn0_hz, length_s, spacing),
             doppler_hz: sign * nco.doppler_hz,
             doppler_variance_hz2: 12.0 / (tau * tau * snr * length_s * length_s),
+            doppler_age_s: 0.0,
             doppler_cycles: sign * nco.doppler_cycles,
             phase_slipped: true,
             cn0_dbhz: cn0::dbhz(cn0_hz),

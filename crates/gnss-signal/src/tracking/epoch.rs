@@ -25,6 +25,8 @@ pub struct ChannelEpoch {
     pub doppler_hz: f64,
     /// Its variance, Hz^2; infinite where a steered channel measured none.
     pub doppler_variance_hz2: f64,
+    /// How long before the epoch a steered channel's Doppler holds, s; zero where it is carried there.
+    pub doppler_age_s: f64,
     /// Integral of the Doppler since the channel's start, cycles.
     pub doppler_cycles: f64,
     /// Phase lock was lost since the previous epoch.
@@ -52,6 +54,8 @@ pub(super) struct EpochValues {
     /// Apparent Doppler, Hz.
     pub(super) doppler_hz: f64,
     pub(super) doppler_variance_hz2: f64,
+    /// When the Doppler holds, s on the channel's clock; `None`: at the epoch.
+    pub(super) doppler_at_s: Option<f64>,
 }
 
 impl EpochValues {
@@ -64,6 +68,7 @@ impl EpochValues {
             frequency_error_hz: 0.0,
             doppler_hz,
             doppler_variance_hz2: f64::INFINITY,
+            doppler_at_s: None,
         }
     }
 }

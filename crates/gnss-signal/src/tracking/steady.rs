@@ -138,6 +138,10 @@ impl Steady {
         self.lock
     }
 
+    pub(super) fn cn0_dbhz(&self) -> f64 {
+        cn0::dbhz(self.cn0_hz)
+    }
+
     pub(super) const fn is_steered(&self) -> bool {
         matches!(self.helm, Helm::Navigation(_))
     }
@@ -415,6 +419,9 @@ impl Steady {
             code_variance_chips2: measured.code_variance_chips2,
             doppler_hz: sign * measured.doppler_hz,
             doppler_variance_hz2: measured.doppler_variance_hz2,
+            doppler_age_s: measured
+                .doppler_at_s
+                .map_or(0.0, |s| tick as f64 / at.front_end.sample_rate_hz - s),
             doppler_cycles: sign * at.doppler_cycles,
             phase_slipped: std::mem::replace(&mut self.slipped, self.lock != Lock::Carrier),
             cn0_dbhz: cn0::dbhz(self.cn0_hz),
@@ -445,6 +452,7 @@ impl Steady {
                     frequency_error_hz,
                     doppler_hz,
                     doppler_variance_hz2,
+                    doppler_at_s: None,
                 }
             }
             Helm::Navigation(steered) => {
@@ -460,6 +468,7 @@ impl Steady {
                     Some((doppler_hz, doppler_variance_hz2)) => EpochValues {
                         doppler_hz,
                         doppler_variance_hz2,
+                        doppler_at_s: None,
                         ..values
                     },
                 }

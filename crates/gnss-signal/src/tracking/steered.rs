@@ -175,6 +175,8 @@ pub(super) struct Measured {
 struct Frequency {
     error_hz: f64,
     doppler_hz: f64,
+    /// When it holds, s on the channel's clock.
+    at_s: f64,
 }
 
 /// The interval being summed.
@@ -317,6 +319,7 @@ impl Steered {
             frequency_error_hz: frequencies().map(|f| f.error_hz).sum::<f64>() / pairs.max(1.0),
             doppler_hz: frequencies().map(|f| f.doppler_hz).sum::<f64>() / pairs.max(1.0),
             doppler_variance_hz2: reception.frequency_variance_hz2(sums_s) / pairs,
+            doppler_at_s: (pairs > 0.0).then(|| frequencies().map(|f| f.at_s).sum::<f64>() / pairs),
         })
     }
 
@@ -386,6 +389,7 @@ fn frequency(a: &Part, b: &Part, pairs: FrequencyPairs, reception: &Reception) -
     Frequency {
         error_hz,
         doppler_hz: oscillator_hz + error_hz,
+        at_s: (a.mean(a.middle_s) + b.mean(b.middle_s)) / 2.0,
     }
 }
 

@@ -19,6 +19,7 @@ mod sky;
 mod slot;
 mod spectrum;
 mod vector;
+mod vector_members;
 mod vector_mode;
 
 pub use outcome::Outcome;

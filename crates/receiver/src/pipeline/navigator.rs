@@ -146,6 +146,12 @@ impl Navigator {
         Some(clock.at(tick))
     }
 
+    /// Whether there is an ephemeris of `satellite` for now.
+    pub(super) fn knows(&self, satellite: SatelliteId) -> bool {
+        let near = self.near;
+        near.is_some_and(|time| self.store.select(satellite, time).is_some())
+    }
+
     /// Takes over where vector tracking has got to.
     pub(super) fn follow(&mut self, state: &NavState) {
         self.place = Some(Place {

@@ -1,6 +1,6 @@
 //! The loop over a run's samples.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use gnss_nav::SatelliteId;
 use gnss_signal::tracking::{NoiseFloor, Spectrum, TrackingSettings};
@@ -53,6 +53,8 @@ pub fn run<B: CorrelatorBank>(
         steps: 0,
         vector: None,
         consistent_fixes: 0,
+        next_look_s: 0.0,
+        silent_until_s: BTreeMap::new(),
     };
     run.until_the_end()
 }
@@ -87,6 +89,10 @@ pub(super) struct Run<'a, B> {
     pub(super) vector: Option<VectorTracking>,
     /// Successive fixes whose measurements agree.
     pub(super) consistent_fixes: u32,
+    /// When vector tracking next looks for satellites that rise or set, s.
+    pub(super) next_look_s: f64,
+    /// Predicted signals that were not there, and until when they are left alone, s.
+    pub(super) silent_until_s: BTreeMap<SignalId, f64>,
 }
 
 impl<B: CorrelatorBank> Run<'_, B> {

@@ -32,7 +32,8 @@ impl<B: CorrelatorBank> Run<'_, B> {
             .filter(|s| !tracked.contains(s))
             .filter(|s| {
                 let satellite = SatelliteId::gps(s.prn());
-                !self.navigator.is_below_horizon(satellite, now)
+                let joins = self.vector.is_some() && self.navigator.knows(satellite);
+                !joins && !self.navigator.is_below_horizon(satellite, now)
             })
             .collect();
         if wanted.is_empty() {

@@ -1,11 +1,14 @@
 //! One satellite being received: its channel, its message, and what its code phase means in time.
 
 use gnss_nav::lnav::{LnavDecoder, LnavEvent, NavBit, Polarity, nearest_time};
+use gnss_nav::prediction::Expected;
 use gnss_nav::{GpsTime, SatelliteId};
 use gnss_signal::tracking::{
     Channel, ChannelEpoch, ChannelUpdate, Lock, NoiseFloor, TrackingSettings,
 };
-use gnss_signal::{AcquisitionHit, FrontEnd, Replica, Signal, Taps};
+use gnss_signal::{AcquisitionHit, FrontEnd, Replica, Signal, SignalId, Taps};
+
+use super::vector::steering;
 
 /// One satellite being received.
 #[derive(Debug, Clone)]
@@ -19,6 +22,8 @@ pub(super) struct Slot {
     /// Subframes received with every word good since the channel began, bit 0 = subframe 1.
     pub(super) subframes: u8,
     pub(super) lock_reported: Lock,
+    /// Whether the channel began where navigation predicts a signal, without an acquisition.
+    pub(super) predicted: bool,
     /// Whether the acquisition was reported.
     pub(super) announced: bool,
     pub(super) bits_found: bool,
@@ -53,9 +58,45 @@ impl Slot {
             frame: None,
             subframes: 0,
             lock_reported: Lock::PullIn,
+            predicted: false,
             announced: false,
             bits_found: false,
             phase_offset_cycles: None,
+        }
+    }
+
+    /// A slot on a signal that navigation expects at `tick`.
+    pub(super) fn predicted(
+        signal: SignalId,
+        front_end: FrontEnd,
+        tracking: TrackingSettings,
+        tick: u64,
+        expected: &Expected,
+    ) -> Self {
+        let steering = steering(tick, expected);
+        let bit_periods = i64::from(signal.spec().code_periods_per_bit);
+        let periods = (expected.transmit_time.fraction_s() / signal.spec().code_period_s()) as i64;
+        let hit = AcquisitionHit {
+            signal,
+            tick,
+            code_phase_chips: steering.code_phase_chips,
+            doppler_hz: steering.doppler_hz,
+            statistic: 0.0,
+            threshold: 0.0,
+            cn0_dbhz: 0.0,
+        };
+        Self {
+            channel: Channel::predicted(
+                signal,
+                front_end,
+                tracking,
+                &steering,
+                periods.rem_euclid(bit_periods) as u8,
+            ),
+            lock_reported: Lock::Lost,
+            predicted: true,
+            bits_found: true,
+            ..Self::new(&hit, front_end, tracking, expected.transmit_time.week())
         }
     }
 

@@ -59,6 +59,7 @@ impl<B: CorrelatorBank> Run<'_, B> {
         let model = self.navigator.model();
         let epoch = tracking.epoch(&around, &model, &mut self.slots)?;
         self.navigator.follow(tracking.state());
+        self.look_over_sky(now, &tracking)?;
         for (satellite, kind) in epoch.events.clone() {
             self.emit(now, satellite, kind)?;
         }
@@ -130,7 +131,7 @@ impl<B: CorrelatorBank> Run<'_, B> {
 }
 
 /// What the channels of an epoch share; `None` before the clock is exact.
-fn surroundings(navigator: &Navigator, tick: u64) -> Option<Surroundings<'_>> {
+pub(super) fn surroundings(navigator: &Navigator, tick: u64) -> Option<Surroundings<'_>> {
     Some(Surroundings {
         tick,
         receive_time: navigator.receive_time(tick)?,

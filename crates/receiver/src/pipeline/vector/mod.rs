@@ -8,7 +8,7 @@ mod settings;
 mod steering;
 mod watch;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 
 use fault_ml::InnovationTest;
 use gnss_nav::filter::{
@@ -23,6 +23,7 @@ use gnss_nav::{
     Solution, least_squares,
 };
 use gnss_signal::tracking::{ChannelEpoch, Lock};
+use nalgebra::Vector3;
 
 use super::navigator::EXCLUSION_FALSE_ALARM;
 use super::slot::Slot;
@@ -31,6 +32,7 @@ use crate::record::EventKind;
 
 pub(super) use report::observations;
 pub use settings::{FilterKind, MeasurementNoise, Policy, VectorSettings};
+pub(super) use steering::steering;
 use watch::{Change, Watch};
 
 /// Satellites of a fix.
@@ -39,6 +41,9 @@ const NEEDED: usize = 4;
 const STALE_S: f64 = 0.1;
 /// Healthy for so long, s, a satellite is believed again.
 const READMIT_S: f64 = 2.0;
+/// Time over which the receiver's acceleration is a mean, s: long enough that noise of velocities does
+/// not matter over the age of a measurement.
+const ACCELERATION_SPAN_S: f64 = 0.2;
 /// Past this deviation of a predicted range, m, a signal is likely to lie outside the taps: half a
 /// chip.
 const LOST_M: f64 = 150.0;
@@ -94,6 +99,7 @@ pub(super) struct VectorTracking {
     faults: FaultLogic,
     watches: BTreeMap<SatelliteId, Watch>,
     geometry: Option<EpochGeometry>,
+    velocities: VecDeque<(GpsTime, Vector3<f64>)>,
     /// The last epoch.
     pub(super) tick: u64,
     /// When enough satellites for a fix were last used.
@@ -122,6 +128,7 @@ impl VectorTracking {
             faults: FaultLogic::new(FaultThresholds::default())?,
             watches: BTreeMap::new(),
             geometry: None,
+            velocities: VecDeque::new(),
             tick: around.tick,
             fixed: solution.gps_time(),
             outlook: Outlook::Goes,
@@ -157,6 +164,7 @@ impl VectorTracking {
             self.remodel(*model, &measurements)?;
         }
         self.update(&measurements, &mut epoch)?;
+        self.remember_velocity();
         self.steer(around, slots);
         Ok(epoch)
     }
@@ -176,6 +184,7 @@ impl VectorTracking {
             &expected,
             &self.settings,
         );
+        let raw = raw.map(|raw| self.carried(raw, epoch.doppler_age_s, &expected));
         Some(Member {
             satellite,
             epoch,
@@ -187,6 +196,37 @@ impl VectorTracking {
         })
     }
 
+    /// A range rate measured `age_s` ago, carried to the epoch by the receiver's acceleration.
+    fn carried(&self, raw: RawMeasurement, age_s: f64, expected: &Expected) -> RawMeasurement {
+        let path = expected.state.position_ecef_m - self.state().position_ecef_m;
+        let change_mps = -path.normalize().dot(&self.acceleration()) * age_s;
+        RawMeasurement {
+            range_rate_mps: raw.range_rate_mps + change_mps,
+            ..raw
+        }
+    }
+
+    /// Mean acceleration of the receiver over the last epochs, ECEF, m/s^2.
+    fn acceleration(&self) -> Vector3<f64> {
+        let Some((since, velocity_mps)) = self.velocities.front() else {
+            return Vector3::zeros();
+        };
+        let span_s = self.state().time - *since;
+        if span_s < ACCELERATION_SPAN_S / 2.0 {
+            return Vector3::zeros();
+        }
+        (self.state().velocity_ecef_mps - velocity_mps) / span_s
+    }
+
+    /// Keeps the velocities that [`Self::acceleration`] rests on.
+    fn remember_velocity(&mut self) {
+        let state = *self.state();
+        self.velocities
+            .push_back((state.time, state.velocity_ecef_mps));
+        self.velocities
+            .retain(|(time, _)| state.time - *time <= ACCELERATION_SPAN_S);
+    }
+
     fn watch(&mut self, satellite: SatelliteId) -> &mut Watch {
         let clean = (READMIT_S / self.settings.interval_s) as u32;
         self.watches
@@ -194,7 +234,12 @@ impl VectorTracking {
             .or_insert_with(|| Watch::new(self.monitor.clone(), clean))
     }
 
-    fn expected(&self, around: &Surroundings, satellite: SatelliteId) -> Option<Expected> {
+    /// What is expected of a satellite at the epoch.
+    pub(super) fn expected(
+        &self,
+        around: &Surroundings,
+        satellite: SatelliteId,
+    ) -> Option<Expected> {
         let ephemeris = around.store.select(satellite, self.state().time)?;
         let expected = self
             .state()
@@ -308,6 +353,7 @@ impl VectorTracking {
         epoch.events.push((None, kind));
         self.filter = from_solution(&solution, measurements, &self.model, &self.settings)?;
         self.watches.clear();
+        self.velocities.clear();
         Ok(())
     }
 

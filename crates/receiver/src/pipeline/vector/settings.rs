@@ -48,8 +48,8 @@ pub struct VectorSettings {
     pub filter: FilterKind,
     /// Time between two updates of the filter, s. Default 0.02: a data bit.
     pub interval_s: f64,
-    /// How receiver and clock may move. Default: 10 m^2/s^3, which follows a car through turns of 1 g,
-    /// and a TCXO.
+    /// How receiver and clock may move. Default: 10 m^2/s^3 horizontally, which follows a car through
+    /// turns of 1 g, 1 m^2/s^3 vertically, and a TCXO.
     pub process_noise: ProcessNoise,
     /// When the filter skips a measurement. Default: beyond 4 standard deviations.
     pub gate: Gate,
@@ -69,7 +69,10 @@ impl Default for VectorSettings {
             filter: FilterKind::Sequential,
             interval_s,
             process_noise: ProcessNoise {
-                acceleration: AccelerationNoise::isotropic(10.0),
+                acceleration: AccelerationNoise {
+                    horizontal_m2_per_s3: 10.0,
+                    vertical_m2_per_s3: 1.0,
+                },
                 ..ProcessNoise::default()
             },
             gate: Gate::Sigmas(4.0),

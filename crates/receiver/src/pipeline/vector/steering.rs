@@ -21,7 +21,7 @@ impl VectorTracking {
 }
 
 /// The oscillators of a signal that arrives as expected at `tick`.
-pub(super) fn steering(tick: u64, expected: &Expected) -> Steering {
+pub(in crate::pipeline) fn steering(tick: u64, expected: &Expected) -> Steering {
     Steering {
         tick,
         code_phase_chips: expected.code_phase_chips(),
