@@ -2,7 +2,7 @@
 
 use std::marker::PhantomData;
 
-use nalgebra::{Cholesky, Matrix4, Vector4};
+use nalgebra::{Cholesky, Matrix4, Vector3, Vector4};
 
 use super::NavFilter;
 use super::batch::Batch;
@@ -183,6 +183,36 @@ impl<Way: Correct> NavFilter for Ekf<Way> {
         }
         self.state = state;
         self.covariance = covariance;
+        Ok(())
+    }
+
+    fn accelerate(
+        &mut self,
+        acceleration_ecef_mps2: &Vector3<f64>,
+        interval_s: f64,
+    ) -> Result<(), NavError> {
+        let change_mps = acceleration_ecef_mps2 * interval_s;
+        if !change_mps.iter().all(|x| x.is_finite()) {
+            return Err(NavError::Value {
+                name: "acceleration over an interval",
+                value: format!("{acceleration_ecef_mps2:?} over {interval_s} s"),
+                expected: "finite values",
+            });
+        }
+        self.state.velocity_ecef_mps += change_mps;
+        self.state.position_ecef_m += change_mps * (interval_s / 2.0);
+        Ok(())
+    }
+
+    fn loosen_drift(&mut self, variance_m2_s2: f64) -> Result<(), NavError> {
+        if !(variance_m2_s2 >= 0.0 && variance_m2_s2.is_finite()) {
+            return Err(NavError::Value {
+                name: "variance of the clock's drift",
+                value: variance_m2_s2.to_string(),
+                expected: "0 or more, and finite",
+            });
+        }
+        self.covariance.rate[(3, 3)] += variance_m2_s2;
         Ok(())
     }
 

@@ -48,6 +48,8 @@ mod settings;
 #[cfg(test)]
 mod tests;
 
+use nalgebra::Vector3;
+
 use crate::{GpsTime, Measurement, NavError, NavState, SatelliteId};
 
 pub use batch::Batch;
@@ -77,6 +79,26 @@ pub trait NavFilter {
     /// [`NavError::Value`] for a time before the present, [`NavError::Singular`] where the
     /// covariance overflows.
     fn predict(&mut self, to: GpsTime) -> Result<(), NavError>;
+
+    /// Adds what an acceleration known from elsewhere, ECEF, m/s^2, did over the last `interval_s`: the
+    /// control input of the model.
+    ///
+    /// # Errors
+    /// [`NavError::Value`] where it is not finite.
+    fn accelerate(
+        &mut self,
+        acceleration_ecef_mps2: &Vector3<f64>,
+        interval_s: f64,
+    ) -> Result<(), NavError>;
+
+    /// Takes the clock's drift for less certain by `variance_m2_s2`.
+    ///
+    /// Range rates measure the mean frequency over an interval, not the drift: white frequency noise
+    /// lies between them, with a variance of S_f over the interval, common to all.
+    ///
+    /// # Errors
+    /// [`NavError::Value`] where it is negative or not finite.
+    fn loosen_drift(&mut self, variance_m2_s2: f64) -> Result<(), NavError>;
 
     /// Holds `measurements`, taken at the filter's time, against the prediction; changes nothing.
     ///

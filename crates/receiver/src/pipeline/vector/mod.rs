@@ -44,6 +44,11 @@ const READMIT_S: f64 = 2.0;
 /// Time over which the receiver's acceleration is a mean, s: long enough that noise of velocities does
 /// not matter over the age of a measurement.
 const ACCELERATION_SPAN_S: f64 = 0.2;
+/// Deviation of each coordinate at the start beyond the noise of the code loops, m: an unsteady
+/// oscillator or acceleration drags them along.
+const START_SIGMA_M: f64 = 1.5;
+/// An acceleration below two deviations of its noise is none: fed back, noise would grow.
+const SIGNIFICANT_SIGMAS2: f64 = 4.0;
 /// Past this deviation of a predicted range, m, a signal is likely to lie outside the taps: half a
 /// chip.
 const LOST_M: f64 = 150.0;
@@ -100,6 +105,7 @@ pub(super) struct VectorTracking {
     watches: BTreeMap<SatelliteId, Watch>,
     geometry: Option<EpochGeometry>,
     velocities: VecDeque<(GpsTime, Vector3<f64>)>,
+    acceleration_mps2: Vector3<f64>,
     /// The last epoch.
     pub(super) tick: u64,
     /// When enough satellites for a fix were last used.
@@ -129,6 +135,7 @@ impl VectorTracking {
             watches: BTreeMap::new(),
             geometry: None,
             velocities: VecDeque::new(),
+            acceleration_mps2: Vector3::zeros(),
             tick: around.tick,
             fixed: solution.gps_time(),
             outlook: Outlook::Goes,
@@ -152,7 +159,11 @@ impl VectorTracking {
         slots: &mut [Slot],
     ) -> Result<Epoch, ReceiverError> {
         let to = self.state().gps_time(around.receive_time);
+        let interval_s = to - self.state().time;
+        self.acceleration_mps2 = self.mean_acceleration();
         self.filter.predict(to)?;
+        self.filter
+            .accelerate(&self.acceleration_mps2, interval_s)?;
         self.tick = around.tick;
         let mut epoch = Epoch::default();
         for slot in slots.iter_mut().filter(|s| s.channel.is_steered()) {
@@ -199,26 +210,32 @@ impl VectorTracking {
     /// A range rate measured `age_s` ago, carried to the epoch by the receiver's acceleration.
     fn carried(&self, raw: RawMeasurement, age_s: f64, expected: &Expected) -> RawMeasurement {
         let path = expected.state.position_ecef_m - self.state().position_ecef_m;
-        let change_mps = -path.normalize().dot(&self.acceleration()) * age_s;
+        let change_mps = -path.normalize().dot(&self.acceleration_mps2) * age_s;
         RawMeasurement {
             range_rate_mps: raw.range_rate_mps + change_mps,
             ..raw
         }
     }
 
-    /// Mean acceleration of the receiver over the last epochs, ECEF, m/s^2.
-    fn acceleration(&self) -> Vector3<f64> {
-        let Some((since, velocity_mps)) = self.velocities.front() else {
+    /// Mean acceleration of the receiver over the last epochs, ECEF, m/s^2, as far as it stands out of
+    /// the noise of velocities; none where the last epoch was not measured.
+    fn mean_acceleration(&self) -> Vector3<f64> {
+        let measured = self.fixed == self.state().time;
+        let Some((since, velocity_mps)) = self.velocities.front().filter(|_| measured) else {
             return Vector3::zeros();
         };
         let span_s = self.state().time - *since;
         if span_s < ACCELERATION_SPAN_S / 2.0 {
             return Vector3::zeros();
         }
-        (self.state().velocity_ecef_mps - velocity_mps) / span_s
+        let mean = (self.state().velocity_ecef_mps - velocity_mps) / span_s;
+        let covariance = self.filter.covariance();
+        let variance: f64 = [1, 3, 5].iter().map(|i| covariance[(*i, *i)]).sum();
+        let noise = 2.0 * variance / (span_s * span_s);
+        mean * (1.0 - SIGNIFICANT_SIGMAS2 * noise / mean.norm_squared()).max(0.0)
     }
 
-    /// Keeps the velocities that [`Self::acceleration`] rests on.
+    /// Keeps the velocities that [`Self::mean_acceleration`] rests on.
     fn remember_velocity(&mut self) {
         let state = *self.state();
         self.velocities
@@ -252,6 +269,13 @@ impl VectorTracking {
         measurements: &[Measurement],
         epoch: &mut Epoch,
     ) -> Result<(), ReceiverError> {
+        if measurements
+            .iter()
+            .any(|m| m.range_rate_variance_m2.is_finite())
+        {
+            let white = self.settings.process_noise.clock.white_m2_per_s;
+            self.filter.loosen_drift(white / self.settings.interval_s)?;
+        }
         let innovations = self.filter.innovations(measurements)?;
         let dispositions = self.judge(&innovations, epoch)?;
         let update = self.filter.update(&innovations, &dispositions)?;
@@ -405,7 +429,7 @@ fn filter(
 /// A filter that starts where least squares of `measurements` ended.
 ///
 /// What lasts of their errors is not for the filter to average away: it starts with what tracking noise
-/// made of the solution.
+/// made of the solution, and room for what the loops erred beyond their noise.
 fn from_solution(
     solution: &Solution,
     measurements: &[Measurement],
@@ -419,6 +443,9 @@ fn from_solution(
     let start = SequentialFilter::from_solution(solution, filter_settings)?;
     let used = |satellite| solution.satellites.iter().any(|s| s.satellite == satellite);
     let geometry = start.innovations(measurements)?.geometry(used)?;
-    let own = geometry.with_noise_alone(&start.covariance());
+    let mut own = geometry.with_noise_alone(&start.covariance());
+    for offset in [0, 2, 4, 6] {
+        own[(offset, offset)] += START_SIGMA_M * START_SIGMA_M;
+    }
     filter(*start.state(), own, model, settings)
 }

@@ -1,7 +1,7 @@
 //! Settings of vector tracking.
 
 use fault_ml::InnovationTestSettings;
-use gnss_nav::dynamics::{AccelerationNoise, ProcessNoise};
+use gnss_nav::dynamics::ProcessNoise;
 use gnss_nav::filter::Gate;
 
 /// Which filter, by how it takes in an epoch.
@@ -48,8 +48,8 @@ pub struct VectorSettings {
     pub filter: FilterKind,
     /// Time between two updates of the filter, s. Default 0.02: a data bit.
     pub interval_s: f64,
-    /// How receiver and clock may move. Default: 10 m^2/s^3 horizontally, which follows a car through
-    /// turns of 1 g, 1 m^2/s^3 vertically, and a TCXO.
+    /// How receiver and clock may move beside the acceleration that the filter has seen in the last
+    /// 0.2 s. Default: 1 m^2/s^3, which follows a car through turns of 1 g, and a TCXO.
     pub process_noise: ProcessNoise,
     /// When the filter skips a measurement. Default: beyond 4 standard deviations.
     pub gate: Gate,
@@ -68,13 +68,7 @@ impl Default for VectorSettings {
         Self {
             filter: FilterKind::Sequential,
             interval_s,
-            process_noise: ProcessNoise {
-                acceleration: AccelerationNoise {
-                    horizontal_m2_per_s3: 10.0,
-                    vertical_m2_per_s3: 1.0,
-                },
-                ..ProcessNoise::default()
-            },
+            process_noise: ProcessNoise::default(),
             gate: Gate::Sigmas(4.0),
             noise: MeasurementNoise::Measured,
             monitor: Some(InnovationTestSettings {
