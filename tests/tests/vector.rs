@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a failure here is a failed test")]
 
 use receiver::pipeline::{Settings, VectorSettings};
-use receiver::record::{EventKind, Status};
+use receiver::record::{EventKind, Lock, LoopMembership, Status};
 use xtask::judged::{Judged, JudgedEpoch, receive, rms, settings};
 use xtask::scenario::built::Scenario;
 use xtask::scenario::catalogue;
@@ -119,12 +119,9 @@ fn a_blocked_satellite_is_noticed_and_harmless() {
                 epoch.pvt.time_s
             );
         }
-        let lost = judged.events.iter().find(|e| {
-            let lost = receiver::record::Lock::Lost;
-            e.time_s >= blocked_s
-                && matches!(e.kind, EventKind::LockChanged { to, .. } if to == lost)
-        });
-        assert!(lost.unwrap().time_s - blocked_s <= 0.1);
+        let lost = |k: &EventKind| matches!(k, EventKind::LockChanged { to: Lock::Lost, .. });
+        let lost_s = happened(&judged, blocked_s, lost).unwrap();
+        assert!(lost_s - blocked_s <= 0.1);
     }
 }
 
@@ -146,5 +143,89 @@ fn batch_and_sequential_filter_go_the_same_way() {
         // Rounding, through the same noise: steered a nanometre apart, discriminators differ as little.
         let apart_m = (a.pvt.position_ecef_m - b.pvt.position_ecef_m).norm();
         assert!(apart_m < 1e-3, "{apart_m} m at {} s", a.pvt.time_s);
+    }
+}
+/// A car-free sky with one fault at 50 s.
+fn with_fault(fault: &str) -> Judged {
+    run(&scenario(
+        "static-open-sky",
+        &[&format!("fault=[{fault}]")],
+        None,
+    ))
+}
+
+fn happened(judged: &Judged, since_s: f64, what: impl Fn(&EventKind) -> bool) -> Option<f64> {
+    let event = judged
+        .events
+        .iter()
+        .find(|e| e.time_s >= since_s && what(&e.kind));
+    event.map(|e| e.time_s)
+}
+
+#[test]
+fn a_step_of_the_clock_is_followed_and_reported() {
+    // 90 m: a third of a chip, within reach of the taps.
+    let judged = with_fault("{kind=\"clock_jump\",begin_s=50,size_s=3e-7}");
+    let step_s = happened(&judged, 50.0, |k| matches!(k, EventKind::ClockStep { .. }));
+    assert!(step_s.unwrap() <= 50.1);
+    assert!(happened(&judged, 50.0, |k| matches!(k, EventKind::Excluded { .. })).is_none());
+    assert!(judged.epochs.iter().all(|e| e.horizontal_m() < 5.0));
+}
+
+#[test]
+fn jumps_and_gaps_of_the_samples_are_survived_and_reported() {
+    for fault in [
+        "{kind=\"clock_jump\",begin_s=50,size_s=-1e-4}",
+        "{kind=\"dropped_samples\",begin_s=50,duration_s=0.0373}",
+        // A whole number of code periods and bits: only the message tells.
+        "{kind=\"dropped_samples\",begin_s=50,duration_s=0.1}",
+    ] {
+        let judged = with_fault(fault);
+        let scalar = |k: &EventKind| {
+            matches!(
+                k,
+                EventKind::ModeSwitched {
+                    to: LoopMembership::Scalar
+                }
+            )
+        };
+        let vector = |k: &EventKind| {
+            matches!(
+                k,
+                EventKind::ModeSwitched {
+                    to: LoopMembership::Vector
+                }
+            )
+        };
+        let left_s = happened(&judged, 50.0, scalar).unwrap();
+        // Two subframes later at most, a channel's message has told the time again.
+        assert!(left_s < 62.0, "{fault}: {left_s} s");
+        assert!(happened(&judged, left_s, vector).is_some(), "{fault}");
+        // Snapshots between, good to their deviation.
+        assert!(
+            judged.epochs.iter().all(|e| e.horizontal_m() < 15.0),
+            "{fault}"
+        );
+        assert!(judged.availability(90.0, 10.0) >= 0.99);
+    }
+}
+
+#[test]
+fn a_step_and_a_ramp_of_one_satellite_are_excluded() {
+    for (fault, limit_s) in [
+        ("{kind=\"step\",sat=\"G17\",begin_s=50,size_m=50}", 50.5),
+        ("{kind=\"ramp\",sat=\"G17\",begin_s=50,rate_mps=2}", 65.0),
+    ] {
+        let judged = with_fault(fault);
+        let excluded_s = happened(&judged, 0.0, |k| matches!(k, EventKind::Excluded { .. }));
+        let excluded_s = excluded_s.unwrap();
+        assert!(
+            (50.0..limit_s).contains(&excluded_s),
+            "{fault}: {excluded_s} s"
+        );
+        assert!(
+            judged.epochs.iter().all(|e| e.horizontal_m() < 5.0),
+            "{fault}"
+        );
     }
 }

@@ -359,6 +359,11 @@ pub enum EventKind {
         /// Who.
         to: LoopMembership,
     },
+    /// All pseudoranges jumped alike: the receiver's clock made a step.
+    ClockStep {
+        /// By how much they are longer, m.
+        size_m: f64,
+    },
     /// Most channels contradicted the filter; it starts anew from least squares.
     FilterReset {
         /// How many.

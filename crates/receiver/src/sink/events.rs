@@ -86,6 +86,9 @@ enum Detail<'a> {
     Reset {
         channels: usize,
     },
+    ClockStep {
+        size_m: f64,
+    },
     Alarm {
         monitor: &'a str,
         score: f64,
@@ -114,6 +117,7 @@ pub const fn kind_name(kind: &EventKind) -> &'static str {
         EventKind::Alarm { .. } => "alarm",
         EventKind::ModeSwitched { .. } => "mode_switched",
         EventKind::FilterReset { .. } => "filter_reset",
+        EventKind::ClockStep { .. } => "clock_step",
     }
 }
 
@@ -151,6 +155,9 @@ fn detail(kind: &EventKind) -> Detail<'_> {
             iodc: *iodc,
         },
         EventKind::ModeSwitched { to } => Detail::Mode { to: to.name() },
+        EventKind::ClockStep { size_m } => Detail::ClockStep {
+            size_m: rounded(*size_m, 3),
+        },
         EventKind::FilterReset { channels } => Detail::Reset {
             channels: *channels,
         },

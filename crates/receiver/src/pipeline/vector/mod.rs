@@ -3,6 +3,7 @@
 //! This is the one edge along which data goes up: what each channel is steered to follows from the
 //! state of the filter, one epoch later.
 
+mod clock_step;
 mod report;
 mod settings;
 mod steering;
@@ -30,6 +31,7 @@ use super::slot::Slot;
 use crate::ReceiverError;
 use crate::record::EventKind;
 
+use clock_step::ClockStep;
 pub(super) use report::observations;
 pub use settings::{FilterKind, MeasurementNoise, Policy, VectorSettings};
 pub(super) use steering::steering;
@@ -47,6 +49,10 @@ const ACCELERATION_SPAN_S: f64 = 0.2;
 /// Deviation of each coordinate at the start beyond the noise of the code loops, m: an unsteady
 /// oscillator or acceleration drags them along.
 const START_SIGMA_M: f64 = 1.5;
+/// A message tells another time than the filter's when they are this far apart, s: half a code period.
+const TIME_DISAGREES_S: f64 = 0.5e-3;
+/// So many messages are believed rather than the filter: one may be damaged.
+const CONTRADICTING: usize = 2;
 /// An acceleration below two deviations of its noise is none: fed back, noise would grow.
 const SIGNIFICANT_SIGMAS2: f64 = 4.0;
 /// Past this deviation of a predicted range, m, a signal is likely to lie outside the taps: half a
@@ -104,6 +110,8 @@ pub(super) struct VectorTracking {
     faults: FaultLogic,
     watches: BTreeMap<SatelliteId, Watch>,
     geometry: Option<EpochGeometry>,
+    /// Channels whose message tells another time, at the last epoch.
+    contradicting: usize,
     velocities: VecDeque<(GpsTime, Vector3<f64>)>,
     acceleration_mps2: Vector3<f64>,
     /// The last epoch.
@@ -134,6 +142,7 @@ impl VectorTracking {
             faults: FaultLogic::new(FaultThresholds::default())?,
             watches: BTreeMap::new(),
             geometry: None,
+            contradicting: 0,
             velocities: VecDeque::new(),
             acceleration_mps2: Vector3::zeros(),
             tick: around.tick,
@@ -166,6 +175,7 @@ impl VectorTracking {
             .accelerate(&self.acceleration_mps2, interval_s)?;
         self.tick = around.tick;
         let mut epoch = Epoch::default();
+        self.contradicting = 0;
         for slot in slots.iter_mut().filter(|s| s.channel.is_steered()) {
             epoch.members.extend(self.member(around, slot));
         }
@@ -175,6 +185,9 @@ impl VectorTracking {
             self.remodel(*model, &measurements)?;
         }
         self.update(&measurements, &mut epoch)?;
+        if self.contradicting >= CONTRADICTING {
+            self.outlook = Outlook::Contradicted;
+        }
         self.remember_velocity();
         self.steer(around, slots);
         Ok(epoch)
@@ -185,6 +198,10 @@ impl VectorTracking {
         let satellite = slot.satellite;
         let expected = self.expected(around, satellite)?;
         let epoch = slot.channel.epoch(around.tick)?;
+        if let Some(sent) = slot.transmit_time(&epoch, around.receive_time) {
+            let apart_s = sent - expected.transmit_time;
+            self.contradicting += usize::from(apart_s.abs() > TIME_DISAGREES_S);
+        }
         if epoch.lock == Lock::Lost {
             self.watch(satellite).lost();
         }
@@ -276,7 +293,11 @@ impl VectorTracking {
             let white = self.settings.process_noise.clock.white_m2_per_s;
             self.filter.loosen_drift(white / self.settings.interval_s)?;
         }
-        let innovations = self.filter.innovations(measurements)?;
+        let mut innovations = self.filter.innovations(measurements)?;
+        if let Some(step) = clock_step::find(&innovations) {
+            self.step_clock(&step, epoch)?;
+            innovations = self.filter.innovations(measurements)?;
+        }
         let dispositions = self.judge(&innovations, epoch)?;
         let update = self.filter.update(&innovations, &dispositions)?;
         self.note(&innovations, &dispositions, &update, epoch);
@@ -291,6 +312,20 @@ impl VectorTracking {
         if (position / 3.0 + covariance[(6, 6)]).sqrt() > LOST_M {
             self.outlook = Outlook::Lost;
         }
+        Ok(())
+    }
+
+    /// Follows a step of the receiver's clock.
+    fn step_clock(&mut self, step: &ClockStep, epoch: &mut Epoch) -> Result<(), ReceiverError> {
+        let mut state = *self.state();
+        let mut covariance = self.filter.covariance();
+        state.clock_bias_m += step.size_m;
+        covariance[(6, 6)] += step.variance_m2;
+        self.filter = filter(state, covariance, &self.model, &self.settings)?;
+        let kind = EventKind::ClockStep {
+            size_m: step.size_m,
+        };
+        epoch.events.push((None, kind));
         Ok(())
     }
 
