@@ -8,7 +8,7 @@ use super::epoch::{ChannelEpoch, Integration, PhaseLine, PreFilter};
 use super::lock::LockDetector;
 use super::loop_filter::{CarrierLoop, CodeLoop};
 use super::nco::Nco;
-use super::sample_grid::{code_error_correction_chips, shift_chips};
+use super::sample_grid::with_taps;
 use super::{Lock, NavBit, TrackingSettings};
 use crate::Replica;
 
@@ -43,8 +43,6 @@ pub(super) struct Steady {
     prompt: Complex64,
     slipped: bool,
     fade: Fade,
-    /// Integrations so far, modulo their count.
-    turn: u32,
 }
 
 /// The bit being summed.
@@ -87,7 +85,6 @@ impl Steady {
             prompt: Complex64::default(),
             slipped: true,
             fade: Fade::default(),
-            turn: 0,
         }
     }
 
@@ -112,10 +109,8 @@ impl Steady {
         let end = now + length - (now - self.bit_edge).rem_euclid(length);
         let spacing = self.settings.spacing_chips;
         let taps = crate::TapOffsets::early_prompt_late(spacing);
-        let mut replica = self.nco.replica(self.nco.tick_of_period(end), taps);
-        let shift = shift_chips(self.turn, &replica, self.nco.front_end.sample_rate_hz);
-        replica.code_phase_chips = wrapped(replica.code_phase_chips + shift, &self.nco);
-        replica
+        let replica = self.nco.replica(self.nco.tick_of_period(end), taps);
+        with_taps(replica, spacing, self.nco.front_end.sample_rate_hz)
     }
 
     /// Takes the sums of `replica`.
@@ -136,10 +131,7 @@ impl Steady {
         let code_error = self
             .settings
             .code_discriminator
-            .error_chips(taps, self.settings.spacing_chips)
-            + shift_chips(self.turn, replica, start.front_end.sample_rate_hz)
-            + code_error_correction_chips(replica, start.front_end.sample_rate_hz);
-        self.turn = self.turn.wrapping_add(1);
+            .error_chips(taps, self.settings.spacing_chips);
         self.pre_filter.push(Integration {
             middle_s: (start.tick + end_tick) as f64 / 2.0 / start.front_end.sample_rate_hz,
             phase_cycles: start.doppler_cycles + start.doppler_hz * interval_s / 2.0 + phase_error,
@@ -288,13 +280,6 @@ impl Steady {
         let snr = self.snr(self.interval_s());
         spacing / (4.0 * snr) * (1.0 + 2.0 / ((2.0 - spacing) * snr))
     }
-}
-
-/// A code phase brought into [0, code length), chips.
-fn wrapped(chips: f64, nco: &Nco) -> f64 {
-    let length = nco.code_length_chips();
-    let phase = chips.rem_euclid(length);
-    if phase < length { phase } else { 0.0 }
 }
 
 fn bit_periods(nco: &Nco) -> i64 {
