@@ -7,7 +7,7 @@ use std::process::ExitCode;
 use anyhow::Result;
 use clap::{Parser, Subcommand};
 use xtask::ci::ci;
-use xtask::code_noise::{self, Experiment};
+use xtask::code_noise::{self, Experiment, Parts};
 use xtask::demo::demo;
 use xtask::reproduce::{Paper, reproduce};
 use xtask::scenario::command::{self as scenario, Command};
@@ -56,6 +56,9 @@ enum Task {
         /// Code loop bandwidth, Hz [default: the receiver's]
         #[arg(long, value_name = "HZ")]
         code_bandwidth: Option<f64>,
+        /// The receiver's loop at 45 dB-Hz from short runs: what sampling does, and noise, apart
+        #[arg(long, conflicts_with_all = ["cn0", "judged", "settle", "code_bandwidth"])]
+        parts: bool,
     },
     /// Experiments on the generator of signals that take minutes: tables with a verdict
     #[command(subcommand)]
@@ -142,7 +145,13 @@ fn perform(task: Task) -> Result<ExitCode> {
             settle,
             seeds,
             code_bandwidth,
+            parts,
         } => {
+            if parts {
+                let parts = Parts::new(seeds);
+                writeln!(out, "{}", code_noise::table(|case| parts.measure(case))?)?;
+                return Ok(ExitCode::SUCCESS);
+            }
             let mut experiment = Experiment {
                 cn0_dbhz: cn0,
                 judged_s: judged,
@@ -151,10 +160,10 @@ fn perform(task: Task) -> Result<ExitCode> {
                 ..Experiment::default()
             };
             if let Some(bandwidth_hz) = code_bandwidth {
-                experiment.tracking.code_locked_hz = bandwidth_hz;
-                experiment.tracking.code_unlocked_hz = bandwidth_hz;
+                experiment = experiment.with_code_bandwidth(bandwidth_hz);
             }
-            writeln!(out, "{}", code_noise::table(&experiment)?)?;
+            let measure = |case| code_noise::measure(&experiment, case);
+            writeln!(out, "{}", code_noise::table(measure)?)?;
             Ok(ExitCode::SUCCESS)
         }
         Task::Validate(validation) => validate(&validation, &mut out),

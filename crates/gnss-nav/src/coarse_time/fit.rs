@@ -127,18 +127,27 @@ pub(super) fn fit<'a>(
     })
 }
 
-/// The same fit without satellites below the elevation mask, if enough are left.
+/// The same fit without satellites below the elevation mask.
+///
+/// # Errors
+/// [`NavError::TooFew`] with fewer than five above it, and as [`fit`].
 pub(super) fn without_masked<'a>(
     best: Fit<'a>,
     anchor: &Anchor,
     model: &MeasurementModel,
-) -> Fit<'a> {
+) -> Result<Fit<'a>, NavError> {
     let (kept, low): (Vec<Seen>, Vec<Seen>) = best
         .seen
         .iter()
         .partition(|s| s.predicted.look.elevation_rad >= model.elevation_mask_rad);
-    if low.is_empty() || kept.len() < UNKNOWNS {
-        return best;
+    if low.is_empty() {
+        return Ok(best);
+    }
+    if kept.len() < UNKNOWNS {
+        return Err(NavError::TooFew {
+            found: kept.len(),
+            needed: UNKNOWNS,
+        });
     }
     let ranged: Vec<Ranged> = kept
         .iter()
@@ -147,13 +156,9 @@ pub(super) fn without_masked<'a>(
             milliseconds: s.milliseconds,
         })
         .collect();
-    match fit(&ranged, anchor, model, (best.position_ecef_m, best.time)) {
-        Ok(mut fit) => {
-            fit.masked = low.iter().map(|s| s.channel.satellite).collect();
-            fit
-        }
-        Err(_) => best,
-    }
+    let mut above = fit(&ranged, anchor, model, (best.position_ecef_m, best.time))?;
+    above.masked = low.iter().map(|s| s.channel.satellite).collect();
+    Ok(above)
 }
 
 fn see<'a>(

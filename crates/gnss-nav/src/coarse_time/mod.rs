@@ -109,8 +109,8 @@ struct Anchor {
 /// satellites nothing is redundant and the prior has to be within 150 km in all.
 ///
 /// # Errors
-/// [`NavError::TooFew`] with fewer than five usable satellites; [`NavError::NoFit`] when nothing
-/// near the prior agrees; [`NavError::Value`] for a prior or probability out of range;
+/// [`NavError::TooFew`] with fewer than five usable satellites, or above the elevation mask;
+/// [`NavError::NoFit`] when nothing near the prior agrees; [`NavError::Value`] for a prior or probability out of range;
 /// [`NavError::Singular`].
 pub fn solve(
     measurements: &[SnapshotMeasurement],
@@ -129,7 +129,7 @@ pub fn solve(
     }
     let anchor = anchor::from_prior(prior, &channels)?;
     let best = hypothesis::search(&channels, &anchor, model, false_alarm_probability)?;
-    let best = fit::without_masked(best, &anchor, model);
+    let best = fit::without_masked(best, &anchor, model)?;
     finish(&best, &channels, prior, rejected)
 }
 

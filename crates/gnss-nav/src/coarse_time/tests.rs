@@ -224,3 +224,45 @@ fn what_cannot_be_solved_is_an_error() {
     );
     assert!(matches!(random, Err(NavError::NoFit { .. })), "{random:?}");
 }
+
+#[test]
+fn the_elevation_mask_holds_whatever_it_leaves() {
+    let world = world(3);
+    let prior = prior(&world, 3, 10e3, 5.0);
+    let masked_at = |elevation_mask_rad| {
+        let model = MeasurementModel {
+            elevation_mask_rad,
+            ..model()
+        };
+        solve(
+            &world.measurements,
+            &world.store,
+            &prior,
+            &model,
+            FALSE_ALARM,
+        )
+    };
+    let all = masked_at(0.0).unwrap().solution;
+    let mut elevations: Vec<f64> = all.satellites.iter().map(|s| s.elevation_rad).collect();
+    elevations.sort_by(f64::total_cmp);
+    assert!(elevations.len() > UNKNOWNS);
+    // Half way between two satellites, of which five are above, and then four.
+    let leaving = |count: usize| {
+        let at = elevations.len() - count;
+        0.5 * (elevations[at - 1] + elevations[at])
+    };
+    let five = masked_at(leaving(5)).unwrap().solution;
+    assert_eq!(five.satellites.len(), 5);
+    assert_eq!(five.masked.len(), elevations.len() - 5);
+    let four = masked_at(leaving(4));
+    assert!(
+        matches!(
+            four,
+            Err(NavError::TooFew {
+                found: 4,
+                needed: 5
+            })
+        ),
+        "{four:?}"
+    );
+}

@@ -1,10 +1,9 @@
 //! One channel: from an acquisition to bits and epochs, interval by interval.
 
-use super::discriminator::EarlyPromptLate;
 use super::epoch::ChannelEpoch;
 use super::nco::Nco;
 use super::pull_in::{PullInEstimate, Stretch};
-use super::sample_grid::code_error_correction_chips;
+use super::sample_grid::{early_prompt_late, with_taps};
 use super::steady::Steady;
 use super::steered::Steering;
 use super::{Lock, NoiseFloor, TrackingSettings, cn0};
@@ -47,6 +46,7 @@ pub struct BitSync {
 #[derive(Debug, Clone)]
 pub struct Channel {
     settings: TrackingSettings,
+    sample_rate_hz: f64,
     stage: Stage,
 }
 
@@ -64,8 +64,6 @@ struct PullIn {
     start: Nco,
     nco: Nco,
     stretch: Stretch,
-    /// Sum of what the sample grid did to the code errors of the stretch, chips.
-    grid_chips: f64,
 }
 
 /// Fewest periods of a stretch: two whole bits, whose code phases can be compared.
@@ -99,11 +97,11 @@ impl Channel {
         start.doppler_cycles = 0.0;
         Self {
             settings,
+            sample_rate_hz: front_end.sample_rate_hz,
             stage: Stage::PullIn(Box::new(PullIn {
                 start,
                 nco: start,
                 stretch: Stretch::default(),
-                grid_chips: 0.0,
             })),
         }
     }
@@ -135,6 +133,7 @@ impl Channel {
         steady.steer(steering);
         Self {
             settings,
+            sample_rate_hz: front_end.sample_rate_hz,
             stage: Stage::Steady(Box::new(steady)),
         }
     }
@@ -226,11 +225,11 @@ impl Channel {
     pub fn replica(&self) -> Option<Replica> {
         match &self.stage {
             Stage::PullIn(p) => {
-                let taps = TapOffsets::early_prompt_late(self.settings.spacing_chips);
-                Some(
-                    p.nco
-                        .replica(p.nco.tick_of_period(p.nco.nearest_period() + 1), taps),
-                )
+                let spacing = self.settings.spacing_chips;
+                let taps = TapOffsets::early_prompt_late(spacing);
+                let end = p.nco.tick_of_period(p.nco.nearest_period() + 1);
+                let replica = p.nco.replica(end, taps);
+                Some(with_taps(replica, spacing, self.sample_rate_hz))
             }
             Stage::Steady(s) => Some(s.replica()),
             Stage::Lost(..) => None,
@@ -239,20 +238,14 @@ impl Channel {
 
     /// Takes the sums of the last replica.
     pub fn update(&mut self, replica: &Replica, taps: &Taps, noise: &NoiseFloor) -> ChannelUpdate {
-        let [early, prompt, late, ..] = *taps.as_slice() else {
+        let (spacing, rate_hz) = (self.settings.spacing_chips, self.sample_rate_hz);
+        let Some(sums) = early_prompt_late(taps, replica, spacing, rate_hz) else {
             return ChannelUpdate::default();
-        };
-        let sums = EarlyPromptLate {
-            early,
-            prompt,
-            late,
         };
         let variance = noise.variance(taps);
         match &mut self.stage {
             Stage::PullIn(p) => {
                 p.stretch.push(sums, variance);
-                p.grid_chips +=
-                    code_error_correction_chips(replica, p.nco.front_end.sample_rate_hz);
                 p.nco.advance_to(replica.end_tick);
                 self.look_at_stretch()
             }
@@ -321,11 +314,8 @@ impl PullIn {
     }
 
     fn estimate(&self, settings: &TrackingSettings) -> Option<PullInEstimate> {
-        let mut found = self
-            .stretch
-            .estimate(self.period_s(), settings.spacing_chips)?;
-        found.code_offset_chips += self.grid_chips / self.stretch.len() as f64;
-        Some(found)
+        self.stretch
+            .estimate(self.period_s(), settings.spacing_chips)
     }
 
     /// The oscillators at the start, corrected by the estimate.
@@ -383,7 +373,6 @@ impl PullIn {
         self.start = nco;
         self.nco = nco;
         self.stretch = Stretch::default();
-        self.grid_chips = 0.0;
     }
 
     fn epoch(&self, tick: u64, settings: &TrackingSettings) -> Option<ChannelEpoch> {

@@ -12,7 +12,7 @@ use super::lock::LockDetector;
 use super::loop_filter::{CarrierBandwidth, CarrierLoop, CodeLoop};
 use super::nco::Nco;
 use super::presence::Presence;
-use super::sample_grid::{code_error_correction_chips, shift_chips};
+use super::sample_grid::with_taps;
 use super::steered::{Reception, Silence, Steered, SteeredSums, Steering};
 use super::{Lock, NavBit, TrackingSettings};
 use crate::Replica;
@@ -62,8 +62,6 @@ pub(super) struct Steady {
     prompt: Complex64,
     slipped: bool,
     fade: Fade,
-    /// Integrations so far, modulo their count.
-    turn: u32,
 }
 
 /// The bit being summed.
@@ -110,7 +108,6 @@ impl Steady {
             prompt: Complex64::default(),
             slipped: true,
             fade: Fade::default(),
-            turn: 0,
         }
     }
 
@@ -201,10 +198,8 @@ impl Steady {
         let end = now + length - (now - self.bit_edge).rem_euclid(length);
         let spacing = self.settings.spacing_chips;
         let taps = crate::TapOffsets::early_prompt_late(spacing);
-        let mut replica = self.nco.replica(self.nco.tick_of_period(end), taps);
-        let shift = shift_chips(self.turn, &replica, self.nco.front_end.sample_rate_hz);
-        replica.code_phase_chips = wrapped(replica.code_phase_chips + shift, &self.nco);
-        replica
+        let replica = self.nco.replica(self.nco.tick_of_period(end), taps);
+        with_taps(replica, spacing, self.nco.front_end.sample_rate_hz)
     }
 
     /// Takes the sums of `replica`.
@@ -220,9 +215,6 @@ impl Steady {
         let interval_s = (end_tick - start.tick) as f64 / start.front_end.sample_rate_hz;
         self.watch_power(taps.prompt, noise_variance, interval_s, start.tick);
         self.prompt = taps.prompt / noise_variance.sqrt();
-        let offset = shift_chips(self.turn, replica, start.front_end.sample_rate_hz)
-            + code_error_correction_chips(replica, start.front_end.sample_rate_hz);
-        self.turn = self.turn.wrapping_add(1);
         let periods = self.nco.nearest_period() - start.nearest_period();
         let phase_error = PhaseDiscriminator::Costas.error_cycles(taps.prompt);
         let middle_s = (start.tick + end_tick) as f64 / 2.0 / start.front_end.sample_rate_hz;
@@ -235,7 +227,6 @@ impl Steady {
                 start_period: start.nearest_period() - self.bit_edge,
                 middle_s,
                 cycles,
-                code_offset_chips: offset,
             };
             self.take_steered(&sums);
             self.follow_phase(phase_error, interval_s);
@@ -247,8 +238,7 @@ impl Steady {
             let code_error = self
                 .settings
                 .code_discriminator
-                .error_chips(taps, self.settings.spacing_chips)
-                + offset;
+                .error_chips(taps, self.settings.spacing_chips);
             let frequency_error = self.frequency_error_hz(taps.prompt, interval_s);
             self.pre_filter.push(Integration {
                 middle_s,

@@ -106,8 +106,6 @@ pub(super) struct SteeredSums {
     /// Middle, s on the channel's clock, and the oscillator's Doppler cycles there.
     pub(super) middle_s: f64,
     pub(super) cycles: f64,
-    /// Code error that the sums do not show, chips: what the sample grid does.
-    pub(super) code_offset_chips: f64,
 }
 
 /// Weighted sums of a part of an interval.
@@ -120,7 +118,6 @@ struct Part {
     periods: i64,
     middle_s: f64,
     cycles: f64,
-    code_offset_chips: f64,
     shifted_chips: f64,
 }
 
@@ -134,7 +131,6 @@ impl Part {
         self.periods += sums.periods;
         self.middle_s += weight * sums.middle_s;
         self.cycles += weight * sums.cycles;
-        self.code_offset_chips += weight * sums.code_offset_chips;
         self.shifted_chips += weight * shifted_chips;
     }
 
@@ -147,7 +143,6 @@ impl Part {
             periods: self.periods + other.periods,
             middle_s: self.middle_s + other.middle_s,
             cycles: self.cycles + other.cycles,
-            code_offset_chips: self.code_offset_chips + other.code_offset_chips,
             shifted_chips: self.shifted_chips + other.shifted_chips,
         }
     }
@@ -284,8 +279,7 @@ impl Steered {
         let measured = Measured {
             prompt: whole.prompt,
             noise_variance: whole.noise_variance,
-            code_error_chips: code_error_chips(&whole, reception)
-                + whole.mean(whole.code_offset_chips),
+            code_error_chips: code_error_chips(&whole, reception),
             shifted_chips: whole.mean(whole.shifted_chips),
             frequency: pair.map(|(a, b)| frequency(&a, &b, settings.pairs, reception)),
         };

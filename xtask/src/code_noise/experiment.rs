@@ -1,13 +1,10 @@
-//! Code tracking error against truth at sample rates with and without an integer number of samples
-//! per chip.
+//! A made-up signal, tracked and held against its truth.
 
-use std::fmt;
-
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, bail, ensure};
 use gnss_nav::GpsTime;
 use gnss_nav::lnav::LnavEncoder;
 use gnss_signal::sample::{SampleDescription, SampleFormat};
-use gnss_signal::tracking::{Channel, NoiseFloor, TrackingSettings};
+use gnss_signal::tracking::{Channel, Lock, NoiseFloor, TrackingSettings};
 use gnss_signal::{AcquisitionHit, CorrelatorBank, IfCorrelatorBank, InstructionSet, SignalId};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -19,16 +16,8 @@ use crate::scenario::if_signal::Synthesiser;
 use crate::scenario::message::Message;
 use crate::scenario::path::{SignalPath, UniformPath};
 
-/// Rates compared, Hz: 4 and 16 samples a chip exactly, beside rates next to them.
-pub const RATES_HZ: [f64; 4] = [4.0e6, 4.092e6, 16.368e6, 16.369e6];
-/// Each rate with an integer number of samples per chip, with the rate it is held against.
-const INTEGER_AND_BESIDE_HZ: [(f64, f64); 2] = [(4.092e6, 4.0e6), (16.368e6, 16.369e6)];
-/// Dopplers, Hz: nearly no code Doppler, and the usual.
-pub const DOPPLERS_HZ: [f64; 2] = [20.0, 1000.0];
-/// Front ends: two-sided bandwidth over the sample rate.
-pub const BANDWIDTHS: [Option<f64>; 2] = [Some(0.8), None];
-/// Navigation epochs a second.
-const EPOCH_RATE_HZ: f64 = 10.0;
+/// Looks at the noise floor, 1/s.
+const LOOKS_HZ: f64 = 10.0;
 /// A code nobody sends here.
 const NOISE_PRN: u8 = 37;
 const PRN: u8 = 5;
@@ -40,7 +29,7 @@ pub struct Experiment {
     pub cn0_dbhz: f64,
     /// Judged signal of one seed, s.
     pub judged_s: f64,
-    /// Signal before that, s.
+    /// Signal before that, s; or more, up to where steady tracking begins.
     pub settle_s: f64,
     /// Independent runs, each with its own noise and code phase.
     pub seeds: u64,
@@ -61,6 +50,21 @@ impl Default for Experiment {
     }
 }
 
+impl Experiment {
+    /// Signal that may be needed, s: tracking begins after at most two stretches of a second.
+    fn duration_s(&self) -> f64 {
+        self.settle_s + self.judged_s + 2.0
+    }
+
+    /// The same with another code loop, in and out of carrier lock.
+    #[must_use]
+    pub fn with_code_bandwidth(mut self, bandwidth_hz: f64) -> Self {
+        self.tracking.code_locked_hz = bandwidth_hz;
+        self.tracking.code_unlocked_hz = bandwidth_hz;
+        self
+    }
+}
+
 /// One front end and Doppler.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Case {
@@ -77,6 +81,8 @@ pub struct Case {
 pub struct CodeError {
     /// Root mean square about the truth, chips.
     pub rms_chips: f64,
+    /// Standard error of that, chips, by the scatter of the runs; infinite for one run.
+    pub rms_deviation_chips: f64,
     /// Mean, chips; above zero: the tracked phase is ahead of the truth.
     pub mean_chips: f64,
     /// Root mean square the channel itself states, chips.
@@ -90,14 +96,26 @@ pub struct CodeError {
 /// # Errors
 /// Where the signal cannot be made or is not tracked.
 pub fn measure(experiment: &Experiment, case: Case) -> Result<CodeError> {
-    let mut sums = Sums::default();
-    for seed in 0..experiment.seeds {
-        follow(experiment, case, seed, &mut sums)?;
-    }
-    sums.code_error()
+    code_error(&runs(experiment, case)?)
 }
 
-#[derive(Debug, Default)]
+/// Code error of the runs' means alone: of what stays the same over the judged signal.
+///
+/// # Errors
+/// As [`measure`].
+pub(super) fn measure_means(experiment: &Experiment, case: Case) -> Result<CodeError> {
+    let runs = runs(experiment, case)?;
+    let means: Vec<_> = runs.iter().map(Sums::mean).collect();
+    code_error(&means)
+}
+
+fn runs(experiment: &Experiment, case: Case) -> Result<Vec<Sums>> {
+    let seeds = 0..experiment.seeds;
+    seeds.map(|seed| follow(experiment, case, seed)).collect()
+}
+
+/// Sums over the epochs of a run.
+#[derive(Debug, Clone, Copy, Default)]
 struct Sums {
     error: f64,
     square: f64,
@@ -113,16 +131,40 @@ impl Sums {
         self.epochs += 1;
     }
 
-    fn code_error(&self) -> Result<CodeError> {
-        ensure!(self.epochs > 0, "nothing was judged");
+    /// A run of the mean alone.
+    fn mean(&self) -> Self {
         let n = self.epochs as f64;
-        Ok(CodeError {
-            rms_chips: (self.square / n).sqrt(),
-            mean_chips: self.error / n,
-            stated_chips: (self.variance / n).sqrt(),
-            epochs: self.epochs,
-        })
+        let mut mean = Self::default();
+        mean.add(self.error / n, self.variance / n);
+        mean
     }
+}
+
+/// Code error over runs of the same length.
+fn code_error(runs: &[Sums]) -> Result<CodeError> {
+    let total = |value: fn(&Sums) -> f64| runs.iter().map(value).sum::<f64>();
+    let epochs = runs.iter().map(|run| run.epochs).sum::<usize>();
+    ensure!(epochs > 0, "nothing was judged");
+    let n = epochs as f64;
+    let square = total(|run| run.square) / n;
+    let scatter: f64 = runs
+        .iter()
+        .map(|run| (run.square / run.epochs as f64 - square).powi(2))
+        .sum();
+    let count = runs.len() as f64;
+    let square_deviation = if runs.len() > 1 {
+        (scatter / (count - 1.0) / count).sqrt()
+    } else {
+        f64::INFINITY
+    };
+    let rms = square.sqrt();
+    Ok(CodeError {
+        rms_chips: rms,
+        rms_deviation_chips: 0.5 * square_deviation / rms,
+        mean_chips: total(|run| run.error) / n,
+        stated_chips: (total(|run| run.variance) / n).sqrt(),
+        epochs,
+    })
 }
 
 fn scene(experiment: &Experiment, case: Case, path: UniformPath, seed: u64) -> Result<Scene> {
@@ -144,7 +186,7 @@ fn scene(experiment: &Experiment, case: Case, path: UniformPath, seed: u64) -> R
             bandwidth_hz: case.bandwidth.map(|b| b * case.sample_rate_hz),
             gain: Gain::Fixed,
         },
-        duration_s: experiment.settle_s + experiment.judged_s,
+        duration_s: experiment.duration_s(),
         emitters: vec![Box::new(emitter)],
         interference: vec![],
         gaps: vec![],
@@ -152,8 +194,9 @@ fn scene(experiment: &Experiment, case: Case, path: UniformPath, seed: u64) -> R
     })
 }
 
-/// One run: tracks from an acquisition and adds the judged epochs.
-fn follow(experiment: &Experiment, case: Case, seed: u64, sums: &mut Sums) -> Result<()> {
+/// One run: tracks from an acquisition and sums the judged epochs.
+fn follow(experiment: &Experiment, case: Case, seed: u64) -> Result<Sums> {
+    let mut sums = Sums::default();
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let path = UniformPath {
         code_time: GpsTime::new(2350, 100_000.0) + random.random_range(0.0..1.0),
@@ -165,21 +208,29 @@ fn follow(experiment: &Experiment, case: Case, seed: u64, sums: &mut Sums) -> Re
     let hit = acquisition(experiment, &path, &mut random)?;
     let mut channel = Channel::new(&hit, bank.front_end(), experiment.tracking.check()?);
     let rate_hz = case.sample_rate_hz;
-    let epochs = (experiment.settle_s + experiment.judged_s) * EPOCH_RATE_HZ;
-    for k in 1..epochs as u64 {
-        let tick = (k as f64 / EPOCH_RATE_HZ * rate_hz) as u64;
+    // One an integration, so that wide loops hide no error.
+    let epoch_rate_hz = 1e3 / f64::from(experiment.tracking.integration_periods);
+    let epochs = |duration_s: f64| (duration_s * epoch_rate_hz).round() as usize;
+    let epochs_per_look = epochs(1.0 / LOOKS_HZ);
+    let last = epochs(experiment.duration_s());
+    for k in 1..last {
+        let tick = (k as f64 / epoch_rate_hz * rate_hz) as u64;
         bank.advance_to(tick)?;
-        listen(&mut bank, &mut noise, tick)?;
+        if k % epochs_per_look == 1 {
+            listen(&mut bank, &mut noise, tick)?;
+        }
         track(&mut bank, &mut channel, &noise, tick)?;
-        let epoch = channel.epoch(tick);
-        if k as f64 >= experiment.settle_s * EPOCH_RATE_HZ {
-            let epoch = epoch.with_context(|| format!("{case:?}, seed {seed}: signal lost"))?;
+        let steady = channel.epoch(tick).filter(|e| e.lock != Lock::PullIn);
+        if let Some(epoch) = steady.filter(|_| k >= epochs(experiment.settle_s)) {
             let sent = path.arrival(tick as f64 / rate_hz)?.code_time;
             let error = wrapped(epoch.code_phase_chips - chips(sent));
             sums.add(error, epoch.code_variance_chips2);
         }
+        if sums.epochs == epochs(experiment.judged_s) {
+            return Ok(sums);
+        }
     }
-    Ok(())
+    bail!("{case:?}, seed {seed}: not tracked")
 }
 
 /// What acquisition leaves: up to a sixth of a chip and 10 Hz off.
@@ -234,118 +285,44 @@ fn wrapped(chips: f64) -> f64 {
     (chips + 511.5).rem_euclid(1023.0) - 511.5
 }
 
-/// Every case with its result.
-#[derive(Debug, Clone)]
-pub struct Table(pub Vec<(Case, CodeError)>);
-
-/// Measures all rates, Dopplers and front ends, two at a time.
-///
-/// # Errors
-/// As [`measure`].
-pub fn table(experiment: &Experiment) -> Result<Table> {
-    let mut cases = Vec::new();
-    for bandwidth in BANDWIDTHS {
-        for doppler_hz in DOPPLERS_HZ {
-            cases.extend(RATES_HZ.map(|sample_rate_hz| Case {
-                sample_rate_hz,
-                bandwidth,
-                doppler_hz,
-            }));
-        }
-    }
-    let half = cases.len() / 2;
-    let rows = |cases: &[Case]| -> Result<Vec<_>> {
-        cases
-            .iter()
-            .map(|c| Ok((*c, measure(experiment, *c)?)))
-            .collect()
-    };
-    let (first, second) = std::thread::scope(|scope| {
-        let other = scope.spawn(|| rows(&cases[half..]));
-        (rows(&cases[..half]), other.join())
-    });
-    let second = second.map_err(|_| anyhow::anyhow!("a measurement panicked"))?;
-    let mut all = first?;
-    all.extend(second?);
-    Ok(Table(all))
-}
-
-impl Table {
-    /// The largest ratio, behind `bandwidth`, of the rms error at a rate with an integer number of
-    /// samples per chip to that at the rate next to it, at the same Doppler.
-    #[must_use]
-    pub fn worst_ratio(&self, bandwidth: Option<f64>) -> Option<f64> {
-        let rms = |sample_rate_hz, doppler_hz| {
-            let case = Case {
-                sample_rate_hz,
-                bandwidth,
-                doppler_hz,
-            };
-            let row = self.0.iter().find(|(c, _)| *c == case);
-            row.map(|(_, error)| error.rms_chips)
-        };
-        let ratio = |integer_hz, beside_hz, doppler_hz| {
-            Some(rms(integer_hz, doppler_hz)? / rms(beside_hz, doppler_hz)?)
-        };
-        let ratios = DOPPLERS_HZ.iter().flat_map(|&doppler_hz| {
-            INTEGER_AND_BESIDE_HZ.map(|(integer, beside)| ratio(integer, beside, doppler_hz))
-        });
-        ratios.flatten().max_by(f64::total_cmp)
-    }
-}
-
-impl fmt::Display for Table {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        const CHIP_M: f64 = 299_792_458.0 / 1.023e6;
-        writeln!(
-            f,
-            "| fs (MHz) | filter | Doppler (Hz) | rms (m) | mean (m) | stated (m) | epochs |"
-        )?;
-        write!(f, "|---|---|---|---|---|---|---|")?;
-        for (case, error) in &self.0 {
-            let filter = case
-                .bandwidth
-                .map_or("none".to_owned(), |b| format!("{b} fs"));
-            write!(
-                f,
-                "\n| {} | {filter} | {} | {:.3} | {:+.3} | {:.3} | {} |",
-                case.sample_rate_hz / 1e6,
-                case.doppler_hz,
-                error.rms_chips * CHIP_M,
-                error.mean_chips * CHIP_M,
-                error.stated_chips * CHIP_M,
-                error.epochs
-            )?;
-        }
-        for bandwidth in BANDWIDTHS {
-            if let Some(ratio) = self.worst_ratio(bandwidth) {
-                let filter = bandwidth.map_or("no filter".to_owned(), |b| format!("{b} fs"));
-                write!(
-                    f,
-                    "\n{filter}: integer samples per chip over the rate beside: at most {ratio:.2}"
-                )?;
-            }
-        }
-        Ok(())
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
+    fn the_standard_error_is_by_the_scatter_of_the_runs() {
+        let run = |error: f64| {
+            let mut sums = Sums::default();
+            sums.add(error, 4.0);
+            sums.add(error, 4.0);
+            sums
+        };
+        // Mean squares of 1, 4 and 4: mean 3, deviation sqrt(3), of the mean 1; half of that over
+        // the rms of sqrt(3).
+        let error = code_error(&[run(1.0), run(-2.0), run(2.0)]).unwrap();
+        assert!((error.rms_chips - 3f64.sqrt()).abs() < 1e-12);
+        assert!((error.rms_deviation_chips - 0.5 / 3f64.sqrt()).abs() < 1e-12);
+        assert!((error.mean_chips - 1.0 / 3.0).abs() < 1e-12);
+        assert_eq!((error.stated_chips, error.epochs), (2.0, 6));
+        // Without what differs within a run nothing is left of one that is to both sides.
+        let mut sums = run(3.0);
+        sums.add(-6.0, 4.0);
+        assert_eq!(code_error(&[sums.mean()]).unwrap().rms_chips, 0.0);
+        let alone = code_error(&[run(1.0)]).unwrap();
+        assert_eq!(alone.rms_deviation_chips, f64::INFINITY);
+    }
+
+    #[test]
     fn the_code_error_is_what_the_channel_states() {
         // A wide loop, so that a short run holds many independent errors: 2 runs of 5 s at 5 Hz,
         // one in 0.1 s.
-        let mut experiment = Experiment {
+        let experiment = Experiment {
             settle_s: 2.0,
             judged_s: 5.0,
             seeds: 2,
             ..Experiment::default()
-        };
-        experiment.tracking.code_locked_hz = 5.0;
-        experiment.tracking.code_unlocked_hz = 5.0;
+        }
+        .with_code_bandwidth(5.0);
         let case = Case {
             sample_rate_hz: 4.0e6,
             bandwidth: Some(0.8),
@@ -356,32 +333,5 @@ mod tests {
         let ratio = error.rms_chips / error.stated_chips;
         assert!((0.7..1.4).contains(&ratio), "{error:?}");
         assert!(error.mean_chips.abs() < 0.5 * error.rms_chips, "{error:?}");
-    }
-
-    #[test]
-    fn ratios_pair_each_integer_rate_with_its_neighbour() {
-        let row = |sample_rate_hz, rms_chips| {
-            let case = Case {
-                sample_rate_hz,
-                bandwidth: None,
-                doppler_hz: 20.0,
-            };
-            let error = CodeError {
-                rms_chips,
-                mean_chips: 0.0,
-                stated_chips: 0.0,
-                epochs: 1,
-            };
-            (case, error)
-        };
-        let rows = vec![
-            row(4.0e6, 1.0),
-            row(4.092e6, 3.0),
-            row(16.368e6, 1.0),
-            row(16.369e6, 2.0),
-        ];
-        let table = Table(rows);
-        assert_eq!(table.worst_ratio(None), Some(3.0));
-        assert_eq!(table.worst_ratio(Some(0.8)), None);
     }
 }
