@@ -131,8 +131,8 @@ fn acquisitions_err_as_the_engine_on_samples() {
                 "{case:?}: {name} {mean_a} and {mean_b}"
             );
         }
-        let ((a, a_deviation), (b, b_deviation)) =
-            (spread(&drawn.statistics), spread(&sampled.statistics));
+        let (a, b) = (spread(&drawn.statistics).0, spread(&sampled.statistics).0);
+        // Fifty statistics that err by a fifth each leave 3 % of either mean.
         assert!((a / b).ln().abs() < 0.1, "{case:?}: statistics {a} and {b}");
     }
 }
