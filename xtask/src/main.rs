@@ -12,7 +12,7 @@ use xtask::demo::demo;
 use xtask::reproduce::{Paper, reproduce};
 use xtask::scenario::command::{self as scenario, Command};
 use xtask::tidy::{Severity, tidy, workspace_root};
-use xtask::validate::front_ends;
+use xtask::validate::{front_ends, levels};
 
 #[derive(Debug, Parser)]
 #[command(
@@ -92,6 +92,12 @@ enum Validation {
         #[arg(long, value_name = "DIR", default_value = "target/front-ends")]
         out: PathBuf,
     },
+    /// The receiver's position error at the correlator level against that on samples
+    Levels {
+        /// Runs of each level
+        #[arg(long, value_name = "N", default_value_t = 240)]
+        runs: u64,
+    },
 }
 
 fn main() -> ExitCode {
@@ -123,6 +129,11 @@ fn validate(validation: &Validation, out: &mut impl Write) -> Result<ExitCode> {
             let table = front_ends::table(*duration, *seed, folder)?;
             writeln!(out, "{table}")?;
             Ok(verdict(table.holds()))
+        }
+        Validation::Levels { runs } => {
+            let comparison = levels::compare(*runs)?;
+            writeln!(out, "{comparison}")?;
+            Ok(verdict(comparison.holds()))
         }
     }
 }

@@ -543,12 +543,6 @@ fn costas_variance_cycles2(snr: f64) -> f64 {
     (1.0 + 0.5 / snr) / (2.0 * snr) / std::f64::consts::TAU.powi(2)
 }
 
-/// A code phase brought into [0, code length), chips.
-fn wrapped(chips: f64, nco: &Nco) -> f64 {
-    let length = nco.code_length_chips();
-    let phase = chips.rem_euclid(length);
-    if phase < length { phase } else { 0.0 }
-}
 
 fn bit_periods(nco: &Nco) -> i64 {
     i64::from(nco.signal.spec().code_periods_per_bit)

@@ -2,7 +2,7 @@
 
 use std::io;
 
-use anyhow::{Result, ensure};
+use anyhow::Result;
 use gnss_signal::{
     CorrelatorBank, FrontEnd, MAX_TAPS, Replica, SearchReport, SearchRequest, SignalError,
     SignalId, Taps,
@@ -70,18 +70,13 @@ impl CorrelatorLevelBank {
     /// Where a value of the scene is impossible, or a signal has none at its beginning.
     pub fn new(scene: Scene) -> Result<Self> {
         scene.check()?;
-        ensure!(
-            scene.reception.bits.is_none(),
-            "bits: the correlator level has no quantiser but that of the sample format; \
-             expected none, or the level of samples"
-        );
         let timeline = Timeline::new(&scene);
         let mut tracks: Vec<_> = scene.emitters.into_iter().map(RayTracks::new).collect();
         let mut power_hz = 0.0;
         for track in &mut tracks {
             power_hz += track.segment(0.0)?.0.nominal_power_hz();
         }
-        let model = FrontEndModel::new(&scene.reception, power_hz);
+        let model = FrontEndModel::new(&scene.reception, power_hz)?;
         let variance = model.noise_power + model.power_scale * power_hz;
         let sources = scene.interference.into_iter();
         Ok(Self {

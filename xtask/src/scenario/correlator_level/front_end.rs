@@ -9,6 +9,7 @@
 //!   and interference weighted by the spectrum of the code, and quantiser distortion, whose
 //!   colour follows from that of the input.
 
+use anyhow::Result;
 use gnss_signal::Signal;
 
 use super::code_correlation::{Kernel, Lobe};
@@ -80,7 +81,10 @@ impl Filter {
 
 impl FrontEndModel {
     /// A front end for signals that add up to `signal_power_hz` (C/N0 in Hz) when its level is set.
-    pub(super) fn new(reception: &Reception, signal_power_hz: f64) -> Self {
+    ///
+    /// # Errors
+    /// Where the quantiser is not modelled.
+    pub(super) fn new(reception: &Reception, signal_power_hz: f64) -> Result<Self> {
         let samples = &reception.samples;
         let rate_hz = samples.sample_rate_hz;
         let complex = samples.format.is_complex();
@@ -110,7 +114,7 @@ impl FrontEndModel {
             complex,
             chips_per_sample: Signal::GpsL1Ca.spec().code_rate_hz / rate_hz,
         };
-        let quantiser = Quantiser::new(samples.format);
+        let quantiser = Quantiser::new(samples.format, reception.bits)?;
         let response = quantiser.response(1.0);
         let noise = colour.noise_kernel(&quantiser, response);
         let density = |kernel: &Kernel| -> f64 {
@@ -124,7 +128,7 @@ impl FrontEndModel {
         let thermal_density = density(&colour.thermal_kernel()) / components;
         let nominal_thermal = response.gain.powi(2) / rms_squared * thermal_density;
         let kurtosis = quantiser.moment(4, 1.0) / response.power().powi(2);
-        Self {
+        Ok(Self {
             components,
             amplitude_scale: (0.5 * components * components * power_scale).sqrt(),
             power_scale,
@@ -147,7 +151,7 @@ impl FrontEndModel {
             power_deviation: ((kurtosis - 1.0) / components * colour.square_sum()).sqrt(),
             levels: LevelTable::new(&quantiser),
             filter,
-        }
+        })
     }
 
     /// The quantiser's response to components of deviation `rms`, at a level set for `level`.
@@ -304,7 +308,7 @@ mod tests {
             bits: None,
             gain: Gain::Fixed,
         };
-        FrontEndModel::new(&reception, 0.0)
+        FrontEndModel::new(&reception, 0.0).unwrap()
     }
 
     #[test]

@@ -141,7 +141,7 @@ mod tests {
             level_dbhz: Profile::new(vec![(1.0, 60.0), (2.0, 60.0)]).unwrap(),
             pulses,
         };
-        Interferer::new(source, &FrontEndModel::new(&reception, 0.0))
+        Interferer::new(source, &FrontEndModel::new(&reception, 0.0).unwrap())
     }
 
     #[test]

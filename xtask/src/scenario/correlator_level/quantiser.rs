@@ -7,13 +7,11 @@
 
 use std::f64::consts::{SQRT_2, TAU};
 
+use anyhow::{Result, ensure};
 use gnss_signal::sample::SampleFormat;
 use statrs::function::erf::erfc;
 
 use crate::scenario::if_signal::{RMS_8_BIT, STEPS};
-
-/// Step of two bits.
-const STEP_2_BIT: f64 = STEPS[0] as f64;
 
 /// Orders of the expansion beyond the first: 3, 5, .. 21. Only products of different samples
 /// need them, whose correlation is below 1.
@@ -48,24 +46,39 @@ impl Response {
 }
 
 impl Quantiser {
-    /// The quantiser of `format`; formats wider than 8 bits reach the correlators with 8.
-    pub(super) fn new(format: SampleFormat) -> Self {
-        match format.bits_per_sample() / format.components() {
+    /// The quantiser of `bits` for `format`, all that it holds where there are none; formats wider
+    /// than 8 bits reach the correlators with 8.
+    ///
+    /// # Errors
+    /// Where a format narrower or wider than 8 bits is to hold another number of bits.
+    pub(super) fn new(format: SampleFormat, bits: Option<u8>) -> Result<Self> {
+        let room = format.bits_per_sample() / format.components();
+        let depth = bits.map_or(room, usize::from);
+        ensure!(
+            depth == room || (room == 8 && (1..=8).contains(&depth)),
+            "bits: at the correlator level {format} cannot hold {depth}; expected none, or 1 to 8 \
+             in a format of 8"
+        );
+        Ok(match depth {
             1 => Self {
                 thresholds: vec![0.0],
                 height: 2.0,
             },
-            2 => Self {
-                thresholds: vec![-STEP_2_BIT, 0.0, STEP_2_BIT],
-                height: 2.0,
-            },
+            2..=7 => {
+                let step = f64::from(STEPS[depth - 2]);
+                let reach = (1 << (depth - 1)) - 1;
+                Self {
+                    thresholds: (-reach..=reach).map(|k| f64::from(k) * step).collect(),
+                    height: 2.0,
+                }
+            }
             _ => Self {
                 thresholds: (-127..127)
                     .map(|k| (f64::from(k) + 0.5) / f64::from(RMS_8_BIT))
                     .collect(),
                 height: 1.0,
             },
-        }
+        })
     }
 
     fn values(&self) -> impl Iterator<Item = f64> {
@@ -158,7 +171,7 @@ mod tests {
 
     #[test]
     fn one_bit_obeys_the_arcsine_law() {
-        let quantiser = Quantiser::new(SampleFormat::R1Msb);
+        let quantiser = Quantiser::new(SampleFormat::R1Msb, None).unwrap();
         let response = quantiser.response(3.0);
         assert!((response.power() - 1.0).abs() < 1e-12);
         assert!((response.gain - (2.0 / std::f64::consts::PI).sqrt()).abs() < 1e-9);
@@ -173,21 +186,34 @@ mod tests {
     }
 
     #[test]
-    fn two_bits_lose_0_55_db_and_eight_nearly_nothing() {
-        let loss_db = |format| {
-            let response = Quantiser::new(format).response(1.0);
+    fn the_loss_falls_with_the_bits() {
+        let loss_db = |format, bits| {
+            let response = Quantiser::new(format, bits).unwrap().response(1.0);
             10.0 * (response.power() / response.gain.powi(2)).log10()
         };
         // Max's quantiser: 0.55 dB (its figure has two digits); one bit: pi / 2.
-        assert!((loss_db(SampleFormat::R2Msb) - 0.55).abs() < 0.005);
-        assert!((loss_db(SampleFormat::C1Lsb) - 1.961).abs() < 0.001);
-        assert!(loss_db(SampleFormat::Ci8) < 0.001);
+        assert!((loss_db(SampleFormat::R2Msb, None) - 0.55).abs() < 0.005);
+        assert!((loss_db(SampleFormat::C1Lsb, None) - 1.961).abs() < 0.001);
+        assert!(loss_db(SampleFormat::Ci8, None) < 0.001);
+        for (format, bits) in [(SampleFormat::C1Lsb, 1), (SampleFormat::R2Msb, 2)] {
+            let wide = loss_db(SampleFormat::Ci8, Some(bits));
+            assert_eq!(wide, loss_db(format, None));
+        }
+        // Uniform quantisers of 3, 4 and 5 bits have signal over distortion of 14.27, 19.38 and
+        // 24.57 dB (`Max1960`); with the best step the gain is 1 less the distortion.
+        for (bits, ratio_db) in [(3, 14.27), (4, 19.38), (5, 24.57)] {
+            let loss = -10.0 * (1.0 - 10f64.powf(-ratio_db / 10.0)).log10();
+            let found = loss_db(SampleFormat::Ci8, Some(bits));
+            assert!((found - loss).abs() < 0.002, "{bits}: {found} dB");
+        }
+        assert!(Quantiser::new(SampleFormat::R2Msb, Some(1)).is_err());
+        assert!(Quantiser::new(SampleFormat::Ci16Le, Some(4)).is_err());
     }
 
     #[test]
     fn the_table_is_what_it_tabulates() {
         for format in [SampleFormat::R1Msb, SampleFormat::R2Msb, SampleFormat::Ci8] {
-            let quantiser = Quantiser::new(format);
+            let quantiser = Quantiser::new(format, None).unwrap();
             let table = LevelTable::new(&quantiser);
             for rms in [0.31, 0.9977, 1.013, 4.7] {
                 let (found, exact) = (table.at(rms), quantiser.response(rms));

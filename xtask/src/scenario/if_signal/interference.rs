@@ -152,14 +152,17 @@ impl Interferer {
         while at < last {
             let half = 2 * (tick + at) + stagger as i64;
             let here_s = self.grid.elapsed_s(half).0;
-            let grid_end = (tick + at).div_euclid(RUN_TICKS) * RUN_TICKS + RUN_TICKS - tick;
-            let mut end = grid_end.min(last);
+            let mut stretch_begin = (tick + at).div_euclid(RUN_TICKS) * RUN_TICKS - tick;
+            let mut stretch_end = stretch_begin + RUN_TICKS;
             for instant_s in self.interference.level_dbhz.instants_s() {
                 let index = index_of(instant_s);
                 if index > at {
-                    end = end.min(index);
+                    stretch_end = stretch_end.min(index);
+                } else {
+                    stretch_begin = stretch_begin.max(index);
                 }
             }
+            let mut end = stretch_end.min(last);
             let on = self.pulse(here_s, begin_s, at, &index_of, &mut end);
             if let Waveform::Chirp { period_s, .. } = self.interference.waveform {
                 let sweep = (here_s / period_s + 1e-9).floor();
@@ -167,8 +170,9 @@ impl Interferer {
                 end = end.min(next.max(at + 1));
             }
             if on {
-                let end_half = 2 * (tick + end) + stagger as i64;
-                let middle_s = 0.5 * (here_s + self.grid.elapsed_s(end_half).0);
+                // In the middle of the stretch, whatever part of it is asked for.
+                let middle_half = 2 * tick + stretch_begin + stretch_end + stagger as i64;
+                let middle_s = self.grid.elapsed_s(middle_half).0;
                 let level_dbhz = self.interference.level_dbhz.at(middle_s);
                 add(at as usize..end as usize, 10f64.powf(level_dbhz / 20.0));
             }

@@ -52,8 +52,18 @@ pub(super) trait Kernel {
     fn run<F: Floats>(self);
 }
 
+#[cfg(test)]
+thread_local! {
+    /// Leaves this thread no vectors but those of any processor.
+    pub(super) static PORTABLE_ALONE: std::cell::Cell<bool> = const { std::cell::Cell::new(false) };
+}
+
 /// Runs a loop on the widest vectors of this processor.
 pub(super) fn run(kernel: impl Kernel) {
+    #[cfg(test)]
+    if PORTABLE_ALONE.get() {
+        return kernel.run::<Portable>();
+    }
     #[cfg(target_arch = "x86_64")]
     if is_x86_feature_detected!("avx2") {
         // SAFETY: AVX2 was just found.

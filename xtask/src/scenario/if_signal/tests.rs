@@ -1,5 +1,9 @@
 //! Samples against their definition in `f64`, sample by sample.
 
+mod faults;
+mod front_end;
+mod interference;
+
 use std::f64::consts::TAU;
 use std::io::Read;
 use std::num::NonZeroUsize;
@@ -119,8 +123,11 @@ fn samples(scene: Scene) -> Vec<[f64; 2]> {
 
 /// Sum of all rays at tick `k`, and whether a chip ends within 1e-5 chips (3 mm) of it.
 fn ideal(emitters: &mut [TwoRays], k: usize) -> ([f64; 2], bool) {
+    sum_of_rays(emitters, k as f64 / RATE_HZ)
+}
+
+fn sum_of_rays(emitters: &mut [TwoRays], elapsed_s: f64) -> ([f64; 2], bool) {
     let (mut sum, mut at_edge) = ([0.0, 0.0], false);
-    let elapsed_s = k as f64 / RATE_HZ;
     for emitter in emitters {
         let mut rays = Vec::new();
         emitter.rays(elapsed_s, elapsed_s, &mut rays).unwrap();

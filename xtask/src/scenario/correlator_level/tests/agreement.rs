@@ -169,6 +169,7 @@ fn successive(
 struct Case {
     name: &'static str,
     format: SampleFormat,
+    bits: Option<u8>,
     rate_hz: f64,
     bandwidth: Option<f64>,
     cn0_dbhz: f64,
@@ -183,7 +184,10 @@ const NEAR: Mismatch = Mismatch {
 };
 
 fn compare(case: &Case) {
-    let reception = reception(case.format, case.rate_hz, case.bandwidth);
+    let reception = Reception {
+        bits: case.bits,
+        ..reception(case.format, case.rate_hz, case.bandwidth)
+    };
     let path = path(1_234.0);
     let replicas = successive(
         &reception,
@@ -204,6 +208,7 @@ fn case(name: &'static str, format: SampleFormat) -> Case {
     Case {
         name,
         format,
+        bits: None,
         rate_hz: 2.6e6,
         bandwidth: None,
         cn0_dbhz: 45.0,
@@ -217,6 +222,12 @@ fn direct_signals_agree_in_every_number_of_bits() {
     use SampleFormat::{C1Msb, Ci8, R1Msb, R2Lsb, Ri8};
     for format in [Ci8, C1Msb, Ri8, R2Lsb, R1Msb] {
         compare(&case(format.name(), format));
+    }
+    for bits in [1, 2, 4] {
+        compare(&Case {
+            bits: Some(bits),
+            ..case("fewer bits", Ci8)
+        });
     }
 }
 
@@ -351,4 +362,32 @@ fn bits_edges_and_gaps_fall_on_the_same_samples() {
         // Noise of both, four deviations; the prompt sum has 40.
         assert!(difference.norm() < 4.0 * 2f64.sqrt() * deviation);
     }
+}
+
+#[test]
+fn an_interval_correlated_again_has_the_same_sums() {
+    let (reception, path) = (reception(SampleFormat::Ci8, 2.6e6, Some(0.8)), path(-800.0));
+    let emitter = || TestEmitter::new(45.0, path, lnav(path.code_time));
+    let bank = || {
+        let mut bank = CorrelatorLevelBank::new(scene(reception, 1.5, vec![emitter()])).unwrap();
+        bank.advance_to(2_600_000).unwrap();
+        bank
+    };
+    let replicas = successive(&reception, &path, 8, 26_000, NEAR);
+    let correlated = |bank: &mut CorrelatorLevelBank, replicas: &[Replica]| {
+        let mut taps = Vec::new();
+        bank.correlate(replicas, &mut taps).unwrap();
+        taps.iter()
+            .map(|t| (t.as_slice().to_vec(), t.sample_power))
+            .collect::<Vec<_>>()
+    };
+    let mut one = bank();
+    let first = correlated(&mut one, &replicas);
+    // Again, after time has gone on, and by another bank that is asked the other way round.
+    one.advance_to(3_000_000).unwrap();
+    assert!(correlated(&mut one, &replicas) == first);
+    let backwards: Vec<Replica> = replicas.iter().rev().copied().collect();
+    let mut other = correlated(&mut bank(), &backwards);
+    other.reverse();
+    assert!(other == first);
 }
