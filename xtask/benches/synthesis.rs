@@ -3,7 +3,7 @@
 use std::hint::black_box;
 use std::num::NonZeroUsize;
 
-use anyhow::Result;
+use anyhow::{Result, ensure};
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use gnss_signal::sample::SampleSource;
 use xtask::scenario::built::Scenario;
@@ -53,9 +53,22 @@ fn all(criterion: &mut Criterion) -> Result<()> {
         let samples = DURATION_S * scenario.reception.samples.sample_rate_hz;
         let work = samples * scenario.heard.len() as f64;
         group.throughput(Throughput::Elements(work as u64));
+        let mut failed = None;
+        let mut shortest = usize::MAX;
         group.bench_function(name, |bencher| {
-            bencher.iter(|| black_box(make(&scenario, noise).is_ok()));
+            bencher.iter(|| match make(&scenario, noise) {
+                Ok(bytes) => shortest = shortest.min(black_box(bytes)),
+                Err(error) => failed = Some(error),
+            });
         });
+        if let Some(error) = failed {
+            return Err(error);
+        }
+        let bits = scenario.reception.samples.format.bits_per_sample() as f64;
+        ensure!(
+            shortest as f64 >= (samples * bits / 8.0).floor(),
+            "{name}: {shortest} bytes of {samples} samples"
+        );
     }
     group.finish();
     Ok(())

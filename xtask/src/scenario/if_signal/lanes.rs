@@ -1,8 +1,9 @@
 //! Eight numbers at once: the arithmetic the inner loops are written in, and the instruction sets
 //! they run on.
 //!
-//! Every operation rounds as IEEE 754 says and none is fused, so that all instruction sets give
-//! the same bits.
+//! Every operation rounds as IEEE 754 says, and products are fused with sums exactly where it says
+//! so, so that all instruction sets give the same bits. (Where a processor has no fused product,
+//! the portable one is a slow function of the standard library.)
 #![allow(unsafe_code)] // AVX2 intrinsics, called only where the processor has them.
 
 use std::ops::{Add, BitAnd, BitXor, Mul, Sub};
@@ -22,6 +23,8 @@ pub(super) trait Floats:
     fn min(self, other: Self) -> Self;
     fn max(self, other: Self) -> Self;
     fn over(self, divisor: Self) -> Self;
+    /// `self * factor + addend`, rounded once.
+    fn fused(self, factor: Self, addend: Self) -> Self;
     fn sqrt(self) -> Self;
     /// The bits of each.
     fn bits(self) -> Self::Words;
@@ -55,8 +58,8 @@ pub(super) trait Kernel {
 /// Runs a loop on the widest vectors of this processor.
 pub(super) fn run(kernel: impl Kernel) {
     #[cfg(target_arch = "x86_64")]
-    if is_x86_feature_detected!("avx2") {
-        // SAFETY: AVX2 was just found.
+    if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+        // SAFETY: AVX2 and FMA were just found.
         unsafe { avx2::run(kernel) };
         return;
     }
@@ -127,6 +130,12 @@ impl Floats for Portable {
         self.with(divisor, |a, b| a / b)
     }
     #[inline(always)]
+    fn fused(self, factor: Self, addend: Self) -> Self {
+        Self(std::array::from_fn(|k| {
+            self.0[k].mul_add(factor.0[k], addend.0[k])
+        }))
+    }
+    #[inline(always)]
     fn sqrt(self) -> Self {
         Self(self.0.map(f32::sqrt))
     }
@@ -185,11 +194,11 @@ mod avx2 {
 
     use super::{Floats, Kernel, LANES, Words};
 
-    /// Runs a loop compiled for AVX2.
+    /// Runs a loop compiled for AVX2 and FMA.
     ///
     /// # Safety
-    /// The processor has AVX2.
-    #[target_feature(enable = "avx2")]
+    /// The processor has both.
+    #[target_feature(enable = "avx2,fma")]
     pub(super) unsafe fn run(kernel: impl Kernel) {
         kernel.run::<Wide>();
     }
@@ -206,7 +215,7 @@ mod avx2 {
                 type Output = Self;
                 #[inline(always)]
                 fn $name(self, other: Self) -> Self {
-                    // SAFETY: values exist only where AVX2 does.
+                    // SAFETY: values exist only where AVX2 and FMA do.
                     Self(unsafe { $each(self.0, other.0) })
                 }
             }
@@ -223,8 +232,8 @@ mod avx2 {
         WideWords: BitXor::bitxor as _mm256_xor_si256;
     }
 
-    // SAFETY, of all below: only a loop under `run` asks for these vectors, so that AVX2 is there;
-    // loads and stores take any alignment and stay inside the arrays they are given.
+    // SAFETY, of all below: only a loop under `run` asks for these vectors, so that AVX2 and FMA are
+    // there; loads and stores take any alignment and stay inside the arrays they are given.
     impl Floats for Wide {
         type Words = WideWords;
         #[inline(always)]
@@ -250,6 +259,10 @@ mod avx2 {
         #[inline(always)]
         fn over(self, divisor: Self) -> Self {
             Self(unsafe { _mm256_div_ps(self.0, divisor.0) })
+        }
+        #[inline(always)]
+        fn fused(self, factor: Self, addend: Self) -> Self {
+            Self(unsafe { _mm256_fmadd_ps(self.0, factor.0, addend.0) })
         }
         #[inline(always)]
         fn sqrt(self) -> Self {
