@@ -1,5 +1,7 @@
 //! Speed of synthesis: a tenth of a second of nine satellites at 2.6 MHz on one thread.
 
+mod cpu_time;
+
 use std::hint::black_box;
 use std::num::NonZeroUsize;
 
@@ -9,6 +11,8 @@ use gnss_signal::sample::SampleSource;
 use xtask::scenario::built::Scenario;
 use xtask::scenario::catalogue;
 use xtask::scenario::if_signal::{Options, Synthesiser, ThermalNoise};
+
+use cpu_time::CpuTime;
 
 const DURATION_S: f64 = 0.1;
 
@@ -35,7 +39,7 @@ fn make(scenario: &Scenario, thermal_noise: ThermalNoise) -> Result<usize> {
     }
 }
 
-fn all(criterion: &mut Criterion) -> Result<()> {
+fn all(criterion: &mut Criterion<CpuTime>) -> Result<()> {
     let plain = "front_end={format=\"ci8\", sample_rate_hz=2.6e6}";
     let cases = [
         ("no noise, no filter, 8 bits", plain, ThermalNoise::Absent),
@@ -75,11 +79,15 @@ fn all(criterion: &mut Criterion) -> Result<()> {
 }
 
 #[allow(clippy::panic)] // A benchmark that cannot run has nothing to report.
-fn bench(criterion: &mut Criterion) {
+fn bench(criterion: &mut Criterion<CpuTime>) {
     if let Err(error) = all(criterion) {
         panic!("{error:#}");
     }
 }
 
-criterion_group!(benches, bench);
+criterion_group! {
+    name = benches;
+    config = Criterion::default().with_measurement(CpuTime);
+    targets = bench
+}
 criterion_main!(benches);

@@ -4,40 +4,61 @@ use super::lanes::LANES;
 
 /// Code periods in a table, so that one that begins anywhere reaches [`MOST_CHIPS`] further.
 const PERIODS: usize = 4;
-const CODE_CHIPS: usize = 1023;
+pub(super) const CODE_CHIPS: usize = 1023;
 /// Chips behind the last that a sample holds: what a vector reads beyond.
 const GUARD_CHIPS: usize = LANES + 4;
 /// Chips that one pass of an inner loop may run through.
 pub(super) const MOST_CHIPS: usize = (PERIODS - 1) * CODE_CHIPS - GUARD_CHIPS;
+/// Chips in a table: a power of two at which a vector may begin, and the rest of the last one.
+const LENGTH: usize = PERIODS * CODE_CHIPS + GUARD_CHIPS;
+const BEGINS: usize = 4096;
+const _: () = assert!(LENGTH >= BEGINS - 1 + LANES);
 
-/// Chips of +1 and -1, each with the edge before it.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub(super) struct ChipTable {
-    /// The chips.
-    pub(super) chips: Vec<f32>,
-    /// Mean of a chip and the one before it.
-    pub(super) middles: Vec<f32>,
-    /// Half their difference.
-    pub(super) halves: Vec<f32>,
+/// One number for each chip.
+pub(super) type Table = [f32; LENGTH];
+
+/// The entries of eight chips, from number `first` on.
+#[inline(always)]
+pub(super) fn window(table: &Table, first: usize) -> &[f32; LANES] {
+    // No chip lies beyond: the remainder only shows that none is read outside the table.
+    let first = first % BEGINS;
+    table[first..first + LANES]
+        .as_chunks()
+        .0
+        .first()
+        .unwrap_or(&[0.0; LANES])
 }
 
-/// Part of a [`ChipTable`], from one of its chips on.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Chips<'a> {
-    pub(super) chips: &'a [f32],
-    pub(super) middles: &'a [f32],
-    pub(super) halves: &'a [f32],
+/// Chips of +1 and -1, each with the edge before it.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct ChipTable {
+    /// The chips.
+    pub(super) chips: Box<Table>,
+    /// Mean of a chip and the one before it.
+    pub(super) middles: Box<Table>,
+    /// Half their difference.
+    pub(super) halves: Box<Table>,
 }
 
 impl ChipTable {
+    /// Zeros.
+    pub(super) fn empty() -> Self {
+        let zeros = || Box::new([0.0; LENGTH]);
+        Self {
+            chips: zeros(),
+            middles: zeros(),
+            halves: zeros(),
+        }
+    }
+
     /// A few periods of `code`.
     pub(super) fn of(code: &[i8; CODE_CHIPS]) -> Self {
-        let period = code.map(f32::from);
-        let mut table = Self::default();
-        for _ in 0..PERIODS {
-            table.chips.extend_from_slice(&period);
+        let mut table = Self::empty();
+        for period in table.chips.chunks_mut(CODE_CHIPS) {
+            for (place, chip) in period.iter_mut().zip(code) {
+                *place = f32::from(*chip);
+            }
         }
-        table.chips.extend_from_slice(&period[..GUARD_CHIPS]);
         table.find_edges();
         // The chip before the first is the last of a period.
         (table.middles[0], table.halves[0]) = (table.middles[CODE_CHIPS], table.halves[CODE_CHIPS]);
@@ -46,9 +67,7 @@ impl ChipTable {
 
     /// Finds the edges of the chips; the first is taken to have none.
     fn find_edges(&mut self) {
-        self.middles.resize(self.chips.len(), 0.0);
-        self.halves.resize(self.chips.len(), 0.0);
-        let edges = self.middles.iter_mut().zip(&mut self.halves).skip(1);
+        let edges = self.middles.iter_mut().zip(self.halves.iter_mut()).skip(1);
         for ((middle, half), pair) in edges.zip(self.chips.windows(2)) {
             *middle = 0.5 * (pair[1] + pair[0]);
             *half = 0.5 * (pair[1] - pair[0]);
@@ -65,28 +84,20 @@ impl ChipTable {
         first: usize,
         count: usize,
     ) {
-        let chips = code.from((at + first) % CODE_CHIPS).chips;
-        self.chips.clear();
-        let mut skip = first;
+        let chips = &code.chips[(at + first) % CODE_CHIPS..];
+        let (mut skip, mut filled) = (first, 0);
         for &(run, sign) in bits {
             let passed = skip.min(run);
             skip -= passed;
-            let filled = self.chips.len();
-            let some = &chips[filled..filled + (run - passed).min(count - filled)];
-            self.chips.extend(some.iter().map(|chip| chip * sign));
+            let end = filled + (run - passed).min(count - filled);
+            let places = self.chips[filled..end].iter_mut();
+            for (place, chip) in places.zip(&chips[filled..end]) {
+                *place = chip * sign;
+            }
+            filled = end;
         }
-        // Read with the last chips, and never seen.
-        self.chips.resize(count + GUARD_CHIPS, 0.0);
+        // Older chips that follow are read with the last ones, and never seen.
         self.find_edges();
-    }
-
-    /// The part from chip `at` (of a period) on.
-    pub(super) fn from(&self, at: usize) -> Chips<'_> {
-        Chips {
-            chips: &self.chips[at..],
-            middles: &self.middles[at..],
-            halves: &self.halves[at..],
-        }
     }
 }
 
@@ -106,17 +117,16 @@ mod tests {
         for k in [0, 1, 500, 1022, 1023, MOST_CHIPS + CODE_CHIPS] {
             let chip = |n: usize| f32::from(code()[n % CODE_CHIPS]);
             let (this, before) = (chip(k), chip(k + CODE_CHIPS - 1));
-            let part = table.from(k);
-            assert_eq!(part.chips[0], this);
-            assert_eq!(part.middles[0] + part.halves[0], this);
-            assert_eq!(part.middles[0] - part.halves[0], before);
+            assert_eq!(window(&table.chips, k)[0], this);
+            assert_eq!(table.middles[k] + table.halves[k], this);
+            assert_eq!(table.middles[k] - table.halves[k], before);
         }
     }
 
     #[test]
     fn bits_turn_their_chips_over() {
         let table = ChipTable::of(code());
-        let mut signed = ChipTable::default();
+        let mut signed = ChipTable::empty();
         let bits = [(4, -1.0), (6, 1.0), (100, -1.0)];
         signed.refill_signed(&table, 1020, &bits, 2, 20);
         for k in 0..20 {

@@ -36,7 +36,7 @@ impl LowPass {
     /// Makes `samples` of `out` from planes that begin [`REACH`] samples before them, and
     /// `skipped` more.
     pub(super) fn filter(&self, from: &Planes, skipped: usize, samples: usize, out: &mut Planes) {
-        out.clear(samples);
+        out.fit(samples);
         for (from, to) in [(&from.i, &mut out.i), (&from.q, &mut out.q)] {
             lanes::run(Convolve {
                 taps: &self.taps,
@@ -101,7 +101,7 @@ impl HalfBand {
     /// Makes `samples` of `out` from samples on ticks and samples half a tick later, both from
     /// [`HALF_BAND_REACH`] ticks before them on.
     pub(super) fn decimate(&self, on: &Planes, between: &Planes, samples: usize, out: &mut Planes) {
-        out.clear(samples);
+        out.fit(samples);
         let planes = [
             (&on.i, &between.i, &mut out.i),
             (&on.q, &between.q, &mut out.q),
@@ -225,10 +225,13 @@ fn weigh<F: Floats, const N: usize, const M: usize>(
     taps: &[F; M],
     strip: &[[f32; LANES]],
 ) {
-    let strip = &strip[..N + M - 1];
-    for (m, tap) in taps.iter().enumerate() {
-        for (k, sum) in sums.iter_mut().enumerate() {
-            *sum = F::load(&strip[m + k]).fused(*tap, *sum);
+    // Vector by vector, so that none is held in a register for later.
+    for (n, vector) in strip[..N + M - 1].iter().enumerate() {
+        let vector = F::load(vector);
+        for (m, tap) in taps.iter().enumerate() {
+            if let Some(sum) = n.checked_sub(m).and_then(|k| sums.get_mut(k)) {
+                *sum = vector.fused(*tap, *sum);
+            }
         }
     }
 }

@@ -47,7 +47,7 @@ pub(super) trait Words:
     /// The values, taken as `i32`.
     fn to_floats(self) -> Self::Floats;
     /// The entry of a table at each index below 8.
-    fn pick(self, table: &[f32; LANES]) -> Self::Floats;
+    fn pick(self, table: Self::Floats) -> Self::Floats;
 }
 
 /// A loop that can run on any vectors; `run` is to be `#[inline(always)]`.
@@ -180,8 +180,8 @@ impl Words for PortableWords {
         Portable(self.0.map(|x| x as i32 as f32))
     }
     #[inline(always)]
-    fn pick(self, table: &[f32; LANES]) -> Portable {
-        Portable(self.0.map(|index| table[index as usize % LANES]))
+    fn pick(self, table: Portable) -> Portable {
+        Portable(self.0.map(|index| table.0[index as usize % LANES]))
     }
 }
 
@@ -312,8 +312,8 @@ mod avx2 {
             Wide(unsafe { _mm256_cvtepi32_ps(self.0) })
         }
         #[inline(always)]
-        fn pick(self, table: &[f32; LANES]) -> Wide {
-            Wide(unsafe { _mm256_permutevar8x32_ps(_mm256_loadu_ps(table.as_ptr()), self.0) })
+        fn pick(self, table: Wide) -> Wide {
+            Wide(unsafe { _mm256_permutevar8x32_ps(table.0, self.0) })
         }
     }
 }

@@ -6,7 +6,7 @@
 //! would fold into it.
 
 use super::carrier::{Carrier, GROUP, VECTORS};
-use super::chips::{ChipTable, Chips, MOST_CHIPS};
+use super::chips::{CODE_CHIPS, ChipTable, MOST_CHIPS, Table, window};
 use super::lanes::{self, Floats, Kernel, LANES, Words};
 use super::planes::Planes;
 use super::segment::{CHIP, FRACTION_BITS, Segment, UniformRay};
@@ -52,8 +52,9 @@ pub(super) struct Modulator {
     sampling: Sampling,
     /// Amplitude of a component over the square root of C/N0 in Hz.
     scale: f64,
+    edge: Edge,
     /// Chips among which the bit changes.
-    signed: ChipTable,
+    signed: Box<ChipTable>,
 }
 
 impl Modulator {
@@ -61,7 +62,8 @@ impl Modulator {
         Self {
             sampling,
             scale,
-            signed: ChipTable::default(),
+            edge: Edge::new(),
+            signed: Box::new(ChipTable::empty()),
         }
     }
 
@@ -125,20 +127,21 @@ impl Modulator {
         let first = (phase >> FRACTION_BITS) as usize - 1;
         let last = ((phase + (range.len() as u64 - 1) * step) >> FRACTION_BITS) as usize + 1;
         let mut amplitude = self.scale * ray.amplitude;
-        let chips = match constant_sign(&ray.bits, first, last) {
+        let (code, at) = match constant_sign(&ray.bits, first, last) {
             Some(sign) => {
                 amplitude *= f64::from(sign);
-                segment.code.from((ray.first_chip + first) % CODE_CHIPS)
+                (&*segment.code, (ray.first_chip + first) % CODE_CHIPS)
             }
             None => {
                 let count = last + 1 - first;
                 self.signed
                     .refill_signed(&segment.code, ray.first_chip, &ray.bits, first, count);
-                self.signed.from(0)
+                (&*self.signed, 0)
             }
         };
         let sweep = Sweep {
-            phase: phase - ((first as u64) << FRACTION_BITS),
+            // In chips of the table.
+            phase: phase - ((first as u64) << FRACTION_BITS) + ((at as u64) << FRACTION_BITS),
             step,
             carrier: Carrier::new(
                 amplitude,
@@ -149,20 +152,19 @@ impl Modulator {
             q: &mut planes.q[range],
         };
         match self.sampling {
-            Sampling::Delivered => lanes::run(AddSharp { sweep, chips }),
+            Sampling::Delivered => sweep.run(Sharp { chips: &code.chips }),
             Sampling::Filtered => {
                 let width = (EDGE_HALF_WIDTH * ray.half_step as f64 / CHIP).min(0.5);
-                lanes::run(AddSmooth {
-                    sweep,
-                    chips,
-                    per_width: (1.0 / width) as f32,
+                sweep.run(Smooth {
+                    middles: &code.middles,
+                    halves: &code.halves,
+                    edge: self.edge,
+                    per_width: (self.edge.reach / width) as f32,
                 });
             }
         }
     }
 }
-
-const CODE_CHIPS: usize = 1023;
 
 /// The sign of all chips from number `first` to `last`, in runs of `bits`; none where it changes.
 fn constant_sign(bits: &[(usize, f32)], first: usize, last: usize) -> Option<f32> {
@@ -177,7 +179,20 @@ fn constant_sign(bits: &[(usize, f32)], first: usize, last: usize) -> Option<f32
     None
 }
 
-/// One pass over samples: code phase (chips in fixed point, from the begin of a table) and carrier.
+/// What a signal is between its chips, before its carrier.
+trait Shape: Copy {
+    /// What eight consecutive chips have in common.
+    type Window<F: Floats>: Copy;
+    /// The shape in vectors, which finds its way from the chips with numbers `first` and after.
+    fn window<F: Floats>(self, first: usize) -> Self::Window<F>;
+    /// Values where code phases are so many chips ([`LANE_BITS`] of them behind the point) after
+    /// the begin of a window, less than eight.
+    fn values<F: Floats>(self, window: Self::Window<F>, chips: F::Words) -> F;
+    /// Phase at which a window's first entry is the one to take, chips in fixed point.
+    const AHEAD: u64;
+}
+
+/// One pass over samples: code phase (chips of a table, in fixed point) and carrier.
 struct Sweep<'a> {
     phase: u64,
     step: u64,
@@ -187,139 +202,214 @@ struct Sweep<'a> {
 }
 
 impl Sweep<'_> {
-    /// Adds the carrier times `value_at` (chip number, and the fraction in each lane of a chip with
-    /// [`LANE_BITS`] behind the point) to every sample.
+    /// Adds the carrier times `shape` to every sample.
+    fn run(self, shape: impl Shape) {
+        // Vectors that share a window: they begin in its first chip and reach into its last.
+        let last = |vectors: u64| (vectors * LANES as u64 - 1) * self.step;
+        let reach = (LANES as u64 - 1) << FRACTION_BITS;
+        if last(4) < reach {
+            lanes::run(Add::<_, 4> { sweep: self, shape });
+        } else if last(2) < reach {
+            lanes::run(Add::<_, 2> { sweep: self, shape });
+        } else {
+            lanes::run(Add::<_, 1> { sweep: self, shape });
+        }
+    }
+}
+
+/// A [`Sweep`] in which `SHARING` vectors share a window of chips.
+struct Add<'a, S, const SHARING: usize> {
+    sweep: Sweep<'a>,
+    shape: S,
+}
+
+impl<S: Shape, const SHARING: usize> Kernel for Add<'_, S, SHARING> {
     #[inline(always)]
-    fn add<F: Floats>(self, value_at: impl Fn(usize, F::Words) -> F) {
+    fn run<F: Floats>(self) {
         let Self {
-            phase,
-            step,
-            carrier,
-            i,
-            q,
+            sweep:
+                Sweep {
+                    phase,
+                    step,
+                    carrier,
+                    i,
+                    q,
+                },
+            shape,
         } = self;
-        let shift = FRACTION_BITS - LANE_BITS as u32;
-        let ahead: [u32; LANES] = std::array::from_fn(|k| ((k as u64 * step) >> shift) as u32);
+        let ahead = |row: usize| {
+            let lane = |k: usize| (row * LANES + k) as u64 * step;
+            F::Words::load(&std::array::from_fn(|k| (lane(k) >> LANE_SHIFT) as u32))
+        };
         let mut groups = Groups {
-            phase,
-            step,
+            phase: phase + S::AHEAD,
+            step: SHARING as u64 * LANES as u64 * step,
             carrier,
-            ahead: F::Words::load(&ahead),
+            ahead: std::array::from_fn::<_, SHARING, _>(ahead),
         };
         let (whole_i, rest_i) = i.as_chunks_mut::<GROUP>();
         let (whole_q, rest_q) = q.as_chunks_mut::<GROUP>();
         for (i, q) in whole_i.iter_mut().zip(whole_q) {
-            groups.add(i, q, &value_at);
+            groups.add(i, q, shape);
         }
         if !rest_i.is_empty() {
             let (mut i, mut q) = ([0.0; GROUP], [0.0; GROUP]);
             i[..rest_i.len()].copy_from_slice(rest_i);
             q[..rest_q.len()].copy_from_slice(rest_q);
-            groups.add(&mut i, &mut q, &value_at);
+            groups.add(&mut i, &mut q, shape);
             rest_i.copy_from_slice(&i[..rest_i.len()]);
             rest_q.copy_from_slice(&q[..rest_q.len()]);
         }
     }
 }
 
+/// From the fraction bits of a phase to those in a lane.
+const LANE_SHIFT: u32 = FRACTION_BITS - LANE_BITS as u32;
+
 /// Where a [`Sweep`] stands.
-struct Groups<W> {
+struct Groups<W, const SHARING: usize> {
     phase: u64,
+    /// Advance from one window to the next.
     step: u64,
     carrier: Carrier,
-    /// Advance of each lane over the first.
-    ahead: W,
+    /// Advance of each lane over the first, by vector.
+    ahead: [W; SHARING],
 }
 
-impl<W: Words> Groups<W> {
+impl<W: Words, const SHARING: usize> Groups<W, SHARING> {
     #[inline(always)]
-    fn add(
-        &mut self,
-        i: &mut [f32; GROUP],
-        q: &mut [f32; GROUP],
-        value_at: &impl Fn(usize, W) -> W::Floats,
-    ) {
+    fn add(&mut self, i: &mut [f32; GROUP], q: &mut [f32; GROUP], shape: impl Shape) {
         let mask = (1_u64 << FRACTION_BITS) - 1;
-        let shift = FRACTION_BITS - LANE_BITS as u32;
         let (cosine, sine) = self.carrier.next();
         let (c, s) = (W::Floats::splat(cosine), W::Floats::splat(sine));
         let minus_s = W::Floats::splat(-sine);
         let (i, q) = (i.as_chunks_mut::<LANES>().0, q.as_chunks_mut::<LANES>().0);
-        for k in 0..VECTORS {
-            let fraction = W::splat(((self.phase & mask) >> shift) as u32);
-            let value = value_at(
-                (self.phase >> FRACTION_BITS) as usize,
-                fraction + self.ahead,
-            );
-            self.phase = self.phase.wrapping_add(LANES as u64 * self.step);
-            let cosines = W::Floats::load(&self.carrier.cosines[k]);
-            let sines = W::Floats::load(&self.carrier.sines[k]);
-            let (i, q) = (&mut i[k], &mut q[k]);
-            let re = minus_s.fused(sines, c * cosines);
-            let im = s.fused(cosines, c * sines);
-            value.fused(re, W::Floats::load(i)).store(i);
-            value.fused(im, W::Floats::load(q)).store(q);
+        for first in (0..VECTORS).step_by(SHARING) {
+            let begin = W::splat(((self.phase & mask) >> LANE_SHIFT) as u32);
+            let window = shape.window::<W::Floats>((self.phase >> FRACTION_BITS) as usize);
+            self.phase = self.phase.wrapping_add(self.step);
+            for (row, ahead) in self.ahead.iter().enumerate() {
+                let value = shape.values(window, begin + *ahead);
+                let k = first + row;
+                let cosines = W::Floats::load(&self.carrier.cosines[k]);
+                let sines = W::Floats::load(&self.carrier.sines[k]);
+                let (i, q) = (&mut i[k], &mut q[k]);
+                let re = minus_s.fused(sines, c * cosines);
+                let im = s.fused(cosines, c * sines);
+                value.fused(re, W::Floats::load(i)).store(i);
+                value.fused(im, W::Floats::load(q)).store(q);
+            }
         }
     }
 }
 
-/// Eight entries from `at` on.
-#[inline(always)]
-fn window(table: &[f32], at: usize) -> &[f32; LANES] {
-    // Never beyond the end for want of chips.
-    table
-        .get(at..at + LANES)
-        .and_then(|some| some.first_chunk())
-        .unwrap_or(&[0.0; LANES])
+/// The chip of the instant.
+#[derive(Clone, Copy)]
+struct Sharp<'a> {
+    chips: &'a Table,
 }
 
-struct AddSharp<'a> {
-    sweep: Sweep<'a>,
-    chips: Chips<'a>,
-}
+impl Shape for Sharp<'_> {
+    type Window<F: Floats> = F;
+    const AHEAD: u64 = 0;
 
-impl Kernel for AddSharp<'_> {
     #[inline(always)]
-    fn run<F: Floats>(self) {
-        let chips = self.chips.chips;
-        self.sweep.add::<F>(
-            #[inline(always)]
-            |chip, fraction| fraction.right::<LANE_BITS>().pick(window(chips, chip)),
-        );
+    fn window<F: Floats>(self, first: usize) -> F {
+        F::load(window(self.chips, first))
+    }
+
+    #[inline(always)]
+    fn values<F: Floats>(self, window: F, chips: F::Words) -> F {
+        chips.right::<LANE_BITS>().pick(window)
     }
 }
 
-struct AddSmooth<'a> {
-    sweep: Sweep<'a>,
-    chips: Chips<'a>,
-    /// One over half the width of an edge, 1/chips.
+/// [`EDGE`] in the variable y = x (-d)^(1/7), which spares the last coefficient: it is -1.
+#[derive(Debug, Clone, Copy)]
+struct Edge {
+    /// y at the end of an edge.
+    reach: f64,
+    /// Coefficients of y, y^3, y^5.
+    coefficients: [f32; 3],
+}
+
+impl Edge {
+    fn new() -> Self {
+        let reach = (-EDGE[3]).powf(1.0 / 7.0);
+        let coefficient = |k: usize| (EDGE[k] / reach.powi(2 * k as i32 + 1)) as f32;
+        Self {
+            reach,
+            coefficients: std::array::from_fn(coefficient),
+        }
+    }
+}
+
+/// Chips with smooth edges.
+#[derive(Clone, Copy)]
+struct Smooth<'a> {
+    middles: &'a Table,
+    halves: &'a Table,
+    edge: Edge,
+    /// Distance from the edge in y over that in chips.
     per_width: f32,
 }
 
-impl Kernel for AddSmooth<'_> {
+impl Shape for Smooth<'_> {
+    /// Middles and halves.
+    type Window<F: Floats> = (F, F);
+    /// The nearest edge is the one before half a chip on.
+    const AHEAD: u64 = 1 << (FRACTION_BITS - 1);
+
     #[inline(always)]
-    fn run<F: Floats>(mut self) {
-        let Chips {
-            middles, halves, ..
-        } = self.chips;
-        // The nearest edge is the one before half a chip on.
-        self.sweep.phase += 1 << (FRACTION_BITS - 1);
+    fn window<F: Floats>(self, first: usize) -> (F, F) {
+        (
+            F::load(window(self.middles, first)),
+            F::load(window(self.halves, first)),
+        )
+    }
+
+    #[inline(always)]
+    fn values<F: Floats>(self, (middles, halves): (F, F), chips: F::Words) -> F {
+        let mask = F::Words::splat((1 << LANE_BITS) - 1);
         let to_width = F::splat(self.per_width / (1 << LANE_BITS) as f32);
         let half_chip = F::splat(-0.5 * self.per_width);
-        let (low, high) = (F::splat(-1.0), F::splat(1.0));
-        let [a, b, c, d] = EDGE.map(|coefficient| F::splat(coefficient as f32));
-        let mask = F::Words::splat((1 << LANE_BITS) - 1);
-        self.sweep.add::<F>(
-            #[inline(always)]
-            |chip, fraction| {
-                let index = fraction.right::<LANE_BITS>();
-                let x = (fraction & mask).to_floats().fused(to_width, half_chip);
-                let x = x.min(high).max(low);
-                let x2 = x * x;
-                let slope = d.fused(x2, c).fused(x2, b).fused(x2, a);
-                let half = index.pick(window(halves, chip)) * x;
-                half.fused(slope, index.pick(window(middles, chip)))
-            },
-        );
+        let reach = self.edge.reach as f32;
+        let [a, b, c] = self.edge.coefficients.map(F::splat);
+
+        let y = (chips & mask).to_floats().fused(to_width, half_chip);
+        let y = y.min(F::splat(reach)).max(F::splat(-reach));
+        let y2 = y * y;
+        let slope = (c - y2).fused(y2, b).fused(y2, a);
+        let index = chips.right::<LANE_BITS>();
+        (index.pick(halves) * y).fused(slope, index.pick(middles))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_edge_is_its_polynomial() {
+        let edge = Edge::new();
+        for k in -10..=10 {
+            let x = f64::from(k) / 10.0;
+            let powers = [x, x.powi(3), x.powi(5), x.powi(7)];
+            let expected: f64 = powers.iter().zip(EDGE).map(|(x, c)| x * c).sum();
+            let y = x * edge.reach;
+            let [a, b, c] = edge.coefficients.map(f64::from);
+            let found = y * (a + y * y * (b + y * y * (c - y * y)));
+            // Coefficients of up to 6 in single precision.
+            assert!((found - expected).abs() < 2e-6, "{found} at {x}");
+        }
+    }
+
+    #[test]
+    fn a_bit_is_constant_up_to_its_last_chip() {
+        let bits = [(5, -1.0), (100, 1.0)];
+        assert_eq!(constant_sign(&bits, 0, 4), Some(-1.0));
+        assert_eq!(constant_sign(&bits, 0, 5), None);
+        assert_eq!(constant_sign(&bits, 5, 104), Some(1.0));
+        assert_eq!(constant_sign(&bits, 50, 105), None);
     }
 }

@@ -27,11 +27,18 @@ impl Planes {
         }
     }
 
+    /// Room for `samples` that are about to be made.
+    pub(super) fn fit(&mut self, samples: usize) {
+        for plane in [&mut self.i, &mut self.q] {
+            plane.resize(samples.next_multiple_of(LANES), 0.0);
+        }
+    }
+
     /// Deals samples on half ticks out to those on ticks and those between, where there are
     /// `samples` of each.
     pub(super) fn deal(&self, samples: usize, on: &mut Self, between: &mut Self) {
-        on.clear(samples);
-        between.clear(samples);
+        on.fit(samples);
+        between.fit(samples);
         let planes = [
             (&self.i, &mut on.i, &mut between.i),
             (&self.q, &mut on.q, &mut between.q),
