@@ -1,9 +1,11 @@
 //! Speed of drawn correlator sums: time for ten milliseconds of nine channels with three taps, for
 //! a millisecond with eleven, and for a second of the whole receiver.
 
+mod cpu_time;
+
 use std::hint::black_box;
 
-use anyhow::{Context, Result};
+use anyhow::{Result, ensure};
 use criterion::{Criterion, criterion_group, criterion_main};
 use gnss_nav::GpsTime;
 use gnss_nav::lnav::LnavEncoder;
@@ -19,6 +21,8 @@ use xtask::scenario::correlator_level::CorrelatorLevelBank;
 use xtask::scenario::emitter::PlainEmitter;
 use xtask::scenario::message::Message;
 use xtask::scenario::path::UniformPath;
+
+use cpu_time::CpuTime;
 
 const RATE_HZ: f64 = 2.6e6;
 const CHANNELS: usize = 9;
@@ -83,7 +87,12 @@ fn replicas(scene: &Scene, tick: u64, ticks: u64, taps: TapOffsets) -> Vec<Repli
     channels.collect()
 }
 
-fn bank_alone(criterion: &mut Criterion, name: &str, period_s: f64, offsets: &[f64]) -> Result<()> {
+fn bank_alone(
+    criterion: &mut Criterion<CpuTime>,
+    name: &str,
+    period_s: f64,
+    offsets: &[f64],
+) -> Result<()> {
     let scene = uniform()?;
     let ticks = (period_s * RATE_HZ) as u64;
     let mut all = replicas(&scene, 0, ticks, TapOffsets::new(offsets)?);
@@ -107,7 +116,23 @@ fn bank_alone(criterion: &mut Criterion, name: &str, period_s: f64, offsets: &[f
     failed.map_or(Ok(()), |error| Err(error.into()))
 }
 
-fn whole_receiver(criterion: &mut Criterion) -> Result<()> {
+/// Receives a scenario; that it was received to its end with a solution is checked.
+fn solutions(scenario: &Scenario, settings: &Settings) -> Result<usize> {
+    let bank = CorrelatorLevelBank::new(scenario.scene())?;
+    let mut solutions = 0;
+    let outcome = run(bank, settings, &mut |record| {
+        solutions += usize::from(matches!(record, Record::Pvt(_)));
+        Ok(())
+    })?;
+    ensure!(
+        solutions > 0 && (outcome.signal_s - scenario.duration_s).abs() < 1e-3,
+        "{solutions} solutions in {} s of signal",
+        outcome.signal_s
+    );
+    Ok(solutions)
+}
+
+fn whole_receiver(criterion: &mut Criterion<CpuTime>) -> Result<()> {
     let file = catalogue::find("static-open-sky")?;
     let mut group = criterion.benchmark_group("receiver");
     group.sample_size(10);
@@ -122,25 +147,20 @@ fn whole_receiver(criterion: &mut Criterion) -> Result<()> {
             },
             ..Settings::default()
         };
-        let mut solutions = 0;
+        let mut failed = None;
         group.bench_function(format!("{duration_s} s"), |bencher| {
             bencher.iter(|| {
-                let outcome = CorrelatorLevelBank::new(scenario.scene()).map(|bank| {
-                    run(bank, &settings, &mut |record| {
-                        solutions += usize::from(matches!(record, Record::Pvt(_)));
-                        Ok(())
-                    })
-                });
-                black_box(outcome.is_ok())
+                let done = solutions(&scenario, &settings);
+                failed = failed.take().or(black_box(done).err());
             });
         });
-        (solutions > 0).then_some(()).context("no solution")?;
+        failed.map_or(Ok(()), Err)?;
     }
     group.finish();
     Ok(())
 }
 
-fn all(criterion: &mut Criterion) -> Result<()> {
+fn all(criterion: &mut Criterion<CpuTime>) -> Result<()> {
     let eleven: [f64; 11] = std::array::from_fn(|k| (k as f64 - 5.0) / 10.0);
     bank_alone(
         criterion,
@@ -153,11 +173,15 @@ fn all(criterion: &mut Criterion) -> Result<()> {
 }
 
 #[allow(clippy::panic)] // A benchmark that cannot run has nothing to report.
-fn bench(criterion: &mut Criterion) {
+fn bench(criterion: &mut Criterion<CpuTime>) {
     if let Err(error) = all(criterion) {
         panic!("{error:#}");
     }
 }
 
-criterion_group!(benches, bench);
+criterion_group! {
+    name = benches;
+    config = Criterion::default().with_measurement(CpuTime);
+    targets = bench
+}
 criterion_main!(benches);

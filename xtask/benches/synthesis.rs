@@ -1,14 +1,18 @@
 //! Speed of synthesis: a tenth of a second of nine satellites at 2.6 MHz on one thread.
 
+mod cpu_time;
+
 use std::hint::black_box;
 use std::num::NonZeroUsize;
 
-use anyhow::Result;
+use anyhow::{Result, ensure};
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use gnss_signal::sample::SampleSource;
 use xtask::scenario::built::Scenario;
 use xtask::scenario::catalogue;
 use xtask::scenario::if_signal::{Options, Synthesiser, ThermalNoise};
+
+use cpu_time::CpuTime;
 
 const DURATION_S: f64 = 0.1;
 
@@ -35,7 +39,7 @@ fn make(scenario: &Scenario, thermal_noise: ThermalNoise) -> Result<usize> {
     }
 }
 
-fn all(criterion: &mut Criterion) -> Result<()> {
+fn all(criterion: &mut Criterion<CpuTime>) -> Result<()> {
     let plain = "front_end={format=\"ci8\", sample_rate_hz=2.6e6}";
     let cases = [
         ("no noise, no filter, 8 bits", plain, ThermalNoise::Absent),
@@ -53,20 +57,37 @@ fn all(criterion: &mut Criterion) -> Result<()> {
         let samples = DURATION_S * scenario.reception.samples.sample_rate_hz;
         let work = samples * scenario.heard.len() as f64;
         group.throughput(Throughput::Elements(work as u64));
+        let mut failed = None;
+        let mut shortest = usize::MAX;
         group.bench_function(name, |bencher| {
-            bencher.iter(|| black_box(make(&scenario, noise).is_ok()));
+            bencher.iter(|| match make(&scenario, noise) {
+                Ok(bytes) => shortest = shortest.min(black_box(bytes)),
+                Err(error) => failed = Some(error),
+            });
         });
+        if let Some(error) = failed {
+            return Err(error);
+        }
+        let bits = scenario.reception.samples.format.bits_per_sample() as f64;
+        ensure!(
+            shortest as f64 >= (samples * bits / 8.0).floor(),
+            "{name}: {shortest} bytes of {samples} samples"
+        );
     }
     group.finish();
     Ok(())
 }
 
 #[allow(clippy::panic)] // A benchmark that cannot run has nothing to report.
-fn bench(criterion: &mut Criterion) {
+fn bench(criterion: &mut Criterion<CpuTime>) {
     if let Err(error) = all(criterion) {
         panic!("{error:#}");
     }
 }
 
-criterion_group!(benches, bench);
+criterion_group! {
+    name = benches;
+    config = Criterion::default().with_measurement(CpuTime);
+    targets = bench
+}
 criterion_main!(benches);

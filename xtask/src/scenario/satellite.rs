@@ -114,7 +114,11 @@ impl Satellite {
                 _ => 0.0,
             })
             .sum();
-        self.power.amplitude(elapsed_s, elevation_rad) * 10f64.powf(-loss_db / 20.0)
+        let amplitude = self.power.amplitude(elapsed_s, elevation_rad);
+        if loss_db == 0.0 {
+            return amplitude;
+        }
+        amplitude * 10f64.powf(-loss_db / 20.0)
     }
 }
 

@@ -93,8 +93,9 @@ impl Quantiser {
         self.values()
             .enumerate()
             .map(|(k, value)| {
-                let share = below(k) - before;
-                before = below(k);
+                let now = below(k);
+                let share = now - before;
+                before = now;
                 share * value.powi(power)
             })
             .sum()

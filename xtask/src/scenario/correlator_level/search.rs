@@ -349,9 +349,15 @@ fn band_limited() -> CodeCorrelation {
         (half_turn.sin() / half_turn).powi(2)
     };
     let frequency = |k: u32| BAND_CHIP_RATES * (f64::from(k) + 0.5) / f64::from(STEPS);
-    let total: f64 = (0..STEPS).map(|k| weight(frequency(k))).sum();
+    let lines: Vec<_> = (0..STEPS)
+        .map(|k| (frequency(k), weight(frequency(k))))
+        .collect();
+    let total: f64 = lines.iter().map(|(_, weight)| weight).sum();
     CodeCorrelation::peak(|lag| {
-        let at = |k: u32| weight(frequency(k)) * (TAU * frequency(k) * lag).cos();
-        (0..STEPS).map(at).sum::<f64>() / total
+        let lines = lines.iter();
+        let sum: f64 = lines
+            .map(|(frequency, weight)| weight * (TAU * frequency * lag).cos())
+            .sum();
+        sum / total
     })
 }

@@ -6,11 +6,11 @@ use anyhow::Result;
 use gnss_signal::sample::SampleDescription;
 
 use super::filter::{HALF_BAND_REACH, HalfBand, LowPass, REACH};
-use super::grid::Grid;
+use super::grid::{Grid, HALVES};
 use super::interference::Interferer;
-use super::modulate::{CHUNK, Edges, Modulator, Stagger};
+use super::modulate::{Modulator, Sampling};
 use super::noise::{GROUP, Noise};
-use super::planes::Planes;
+use super::planes::{Planes, Stagger};
 use super::segment::Segment;
 use super::shift::shift;
 use super::synthesiser::ThermalNoise;
@@ -33,6 +33,8 @@ pub(super) struct FrontEnd {
 /// What making samples needs and keeps for the next ones.
 pub(super) struct Bench {
     modulator: Modulator,
+    /// Signals twice a sample, and the two halves of them.
+    halves: Planes,
     on_ticks: Planes,
     between: Planes,
     baseband: Planes,
@@ -76,12 +78,13 @@ impl FrontEnd {
     }
 
     pub(super) fn bench(&self) -> Bench {
-        let edges = match self.filters {
-            Some(_) => Edges::Smooth,
-            None => Edges::Sharp,
+        let sampling = match self.filters {
+            Some(_) => Sampling::Filtered,
+            None => Sampling::Delivered,
         };
         Bench {
-            modulator: Modulator::new(edges, self.scale),
+            modulator: Modulator::new(sampling, self.scale),
+            halves: Planes::default(),
             on_ticks: Planes::default(),
             between: Planes::default(),
             baseband: Planes::default(),
@@ -119,7 +122,9 @@ impl FrontEnd {
         let first = floor_to_group(tick);
         let before = (tick - first) as usize;
         out.clear((before + samples).next_multiple_of(GROUP));
-        self.add_signals(segments, first, Stagger::Whole, &mut bench.modulator, out);
+        let segments = segments.iter().map(AsRef::as_ref);
+        bench.modulator.add_all(segments, HALVES * first, out);
+        self.add_carriers(first, Stagger::Whole, out);
         self.add_noise(first, out);
         for plane in out.each() {
             plane.drain(..before);
@@ -139,40 +144,31 @@ impl FrontEnd {
         let first = floor_to_group(tick - REACH as i64);
         let before = (tick - first) as usize - REACH;
         let length = (before + samples.next_multiple_of(GROUP) + 2 * REACH).next_multiple_of(GROUP);
+        let reach = HALF_BAND_REACH as i64;
         let Bench {
             modulator,
+            halves,
             on_ticks,
             between,
             baseband,
         } = bench;
-        let reach = HALF_BAND_REACH as i64;
+        let made = length + 2 * HALF_BAND_REACH;
+        halves.clear(2 * made);
+        let segments = segments.iter().map(AsRef::as_ref);
+        modulator.add_all(segments, HALVES * (first - reach), halves);
+        halves.deal(made, on_ticks, between);
         for (stagger, planes) in [
             (Stagger::Whole, &mut *on_ticks),
             (Stagger::Half, &mut *between),
         ] {
-            planes.clear(length + 2 * HALF_BAND_REACH);
-            self.add_signals(segments, first - reach, stagger, modulator, planes);
+            self.add_carriers(first - reach, stagger, planes);
         }
         half_band.decimate(on_ticks, between, length, baseband);
         self.add_noise(first, baseband);
         low_pass.filter(baseband, before, samples, out);
     }
 
-    fn add_signals(
-        &self,
-        segments: &[Arc<Segment>],
-        tick: i64,
-        stagger: Stagger,
-        modulator: &mut Modulator,
-        planes: &mut Planes,
-    ) {
-        let length = planes.i.len();
-        for begin in (0..length).step_by(CHUNK) {
-            let range = begin..(begin + CHUNK).min(length);
-            for segment in segments {
-                modulator.add(segment, tick, range.clone(), stagger, planes);
-            }
-        }
+    fn add_carriers(&self, tick: i64, stagger: Stagger, planes: &mut Planes) {
         let widest_hz = match self.filters {
             Some(_) => self.samples.sample_rate_hz,
             None => f64::INFINITY,

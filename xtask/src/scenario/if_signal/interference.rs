@@ -7,9 +7,9 @@ use anyhow::{Result, ensure};
 
 use super::filter::{LowPass, REACH};
 use super::grid::Grid;
-use super::modulate::Stagger;
 use super::noise::{GROUP, Noise};
 use super::planes::Planes;
+use super::planes::Stagger;
 use crate::scenario::antenna::{Interference, Waveform};
 
 /// Ticks after which level and sweep are taken up anew.

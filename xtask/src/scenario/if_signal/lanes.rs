@@ -1,8 +1,9 @@
 //! Eight numbers at once: the arithmetic the inner loops are written in, and the instruction sets
 //! they run on.
 //!
-//! Every operation rounds as IEEE 754 says and none is fused, so that all instruction sets give
-//! the same bits.
+//! Every operation rounds as IEEE 754 says, and products are fused with sums exactly where it says
+//! so, so that all instruction sets give the same bits. (Where a processor has no fused product,
+//! the portable one is a slow function of the standard library.)
 #![allow(unsafe_code)] // AVX2 intrinsics, called only where the processor has them.
 
 use std::ops::{Add, BitAnd, BitXor, Mul, Sub};
@@ -22,6 +23,8 @@ pub(super) trait Floats:
     fn min(self, other: Self) -> Self;
     fn max(self, other: Self) -> Self;
     fn over(self, divisor: Self) -> Self;
+    /// `self * factor + addend`, rounded once.
+    fn fused(self, factor: Self, addend: Self) -> Self;
     fn sqrt(self) -> Self;
     /// The bits of each.
     fn bits(self) -> Self::Words;
@@ -44,7 +47,7 @@ pub(super) trait Words:
     /// The values, taken as `i32`.
     fn to_floats(self) -> Self::Floats;
     /// The entry of a table at each index below 8.
-    fn pick(self, table: &[f32; LANES]) -> Self::Floats;
+    fn pick(self, table: Self::Floats) -> Self::Floats;
 }
 
 /// A loop that can run on any vectors; `run` is to be `#[inline(always)]`.
@@ -65,8 +68,8 @@ pub(super) fn run(kernel: impl Kernel) {
         return kernel.run::<Portable>();
     }
     #[cfg(target_arch = "x86_64")]
-    if is_x86_feature_detected!("avx2") {
-        // SAFETY: AVX2 was just found.
+    if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+        // SAFETY: AVX2 and FMA were just found.
         unsafe { avx2::run(kernel) };
         return;
     }
@@ -137,6 +140,12 @@ impl Floats for Portable {
         self.with(divisor, |a, b| a / b)
     }
     #[inline(always)]
+    fn fused(self, factor: Self, addend: Self) -> Self {
+        Self(std::array::from_fn(|k| {
+            self.0[k].mul_add(factor.0[k], addend.0[k])
+        }))
+    }
+    #[inline(always)]
     fn sqrt(self) -> Self {
         Self(self.0.map(f32::sqrt))
     }
@@ -181,8 +190,8 @@ impl Words for PortableWords {
         Portable(self.0.map(|x| x as i32 as f32))
     }
     #[inline(always)]
-    fn pick(self, table: &[f32; LANES]) -> Portable {
-        Portable(self.0.map(|index| table[index as usize % LANES]))
+    fn pick(self, table: Portable) -> Portable {
+        Portable(self.0.map(|index| table.0[index as usize % LANES]))
     }
 }
 
@@ -195,11 +204,11 @@ mod avx2 {
 
     use super::{Floats, Kernel, LANES, Words};
 
-    /// Runs a loop compiled for AVX2.
+    /// Runs a loop compiled for AVX2 and FMA.
     ///
     /// # Safety
-    /// The processor has AVX2.
-    #[target_feature(enable = "avx2")]
+    /// The processor has both.
+    #[target_feature(enable = "avx2,fma")]
     pub(super) unsafe fn run(kernel: impl Kernel) {
         kernel.run::<Wide>();
     }
@@ -216,7 +225,7 @@ mod avx2 {
                 type Output = Self;
                 #[inline(always)]
                 fn $name(self, other: Self) -> Self {
-                    // SAFETY: values exist only where AVX2 does.
+                    // SAFETY: values exist only where AVX2 and FMA do.
                     Self(unsafe { $each(self.0, other.0) })
                 }
             }
@@ -233,8 +242,8 @@ mod avx2 {
         WideWords: BitXor::bitxor as _mm256_xor_si256;
     }
 
-    // SAFETY, of all below: only a loop under `run` asks for these vectors, so that AVX2 is there;
-    // loads and stores take any alignment and stay inside the arrays they are given.
+    // SAFETY, of all below: only a loop under `run` asks for these vectors, so that AVX2 and FMA are
+    // there; loads and stores take any alignment and stay inside the arrays they are given.
     impl Floats for Wide {
         type Words = WideWords;
         #[inline(always)]
@@ -260,6 +269,10 @@ mod avx2 {
         #[inline(always)]
         fn over(self, divisor: Self) -> Self {
             Self(unsafe { _mm256_div_ps(self.0, divisor.0) })
+        }
+        #[inline(always)]
+        fn fused(self, factor: Self, addend: Self) -> Self {
+            Self(unsafe { _mm256_fmadd_ps(self.0, factor.0, addend.0) })
         }
         #[inline(always)]
         fn sqrt(self) -> Self {
@@ -309,8 +322,8 @@ mod avx2 {
             Wide(unsafe { _mm256_cvtepi32_ps(self.0) })
         }
         #[inline(always)]
-        fn pick(self, table: &[f32; LANES]) -> Wide {
-            Wide(unsafe { _mm256_permutevar8x32_ps(_mm256_loadu_ps(table.as_ptr()), self.0) })
+        fn pick(self, table: Wide) -> Wide {
+            Wide(unsafe { _mm256_permutevar8x32_ps(table.0, self.0) })
         }
     }
 }

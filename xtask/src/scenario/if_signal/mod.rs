@@ -16,6 +16,8 @@
 //! Steps 2 to 5 of a block depend on no other block (but for an automatic gain), so that `supply` has them done
 //! on all threads. Noise is a function of the tick. Inner loops are written in `lanes`.
 
+mod carrier;
+mod chips;
 mod filter;
 mod front_end;
 mod gain;

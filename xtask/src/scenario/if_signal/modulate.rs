@@ -5,18 +5,14 @@
 //! after a low-pass ([`EDGE`]) that passes what the filter lets through and stops what sampling
 //! would fold into it.
 
-use std::f64::consts::TAU;
-
+use super::carrier::{Carrier, GROUP, VECTORS};
+use super::chips::{CODE_CHIPS, ChipTable, MOST_CHIPS, Table, window};
 use super::lanes::{self, Floats, Kernel, LANES, Words};
 use super::planes::Planes;
 use super::segment::{CHIP, FRACTION_BITS, Segment, UniformRay};
 
 /// Samples in which all rays add up before the next ones are made: they stay in the nearest cache.
-pub(super) const CHUNK: usize = 1024;
-/// Chips of a chunk, its neighbours, and what a vector reads beyond.
-const TABLE_CHIPS: usize = CHUNK + 24;
-/// Vectors after which the carrier is taken up anew from double precision.
-const VECTORS: usize = 4;
+const CHUNK: usize = 2688;
 /// Fraction bits of the code phase within a vector: 1e-6 m.
 const LANE_BITS: i32 = 28;
 
@@ -32,72 +28,90 @@ const EDGE: [f64; 4] = [
     -1.929_608_657_934_238,
 ];
 
-/// How chip edges are made.
+/// What samples are made for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Edges {
-    /// At their instant: between two samples.
-    Sharp,
-    /// Low-passed, for a signal made twice a sample and filtered.
-    Smooth,
+pub(super) enum Sampling {
+    /// To be delivered: once a tick, and a chip edge lies between two samples.
+    Delivered,
+    /// To be filtered: on every half tick, with edges low-passed.
+    Filtered,
 }
 
-/// Chips of a ray with their amplitude, as the inner loop reads them.
+impl Sampling {
+    /// Half ticks from a sample to the next.
+    const fn halves(self) -> i64 {
+        match self {
+            Self::Delivered => 2,
+            Self::Filtered => 1,
+        }
+    }
+}
+
+/// Makes the signals of rays.
 pub(super) struct Modulator {
-    edges: Edges,
+    sampling: Sampling,
     /// Amplitude of a component over the square root of C/N0 in Hz.
     scale: f64,
-    chips: Box<[f32; TABLE_CHIPS]>,
-    /// Mean of a chip and the one before it, and half their difference.
-    middles: Box<[f32; TABLE_CHIPS]>,
-    halves: Box<[f32; TABLE_CHIPS]>,
-}
-
-/// Where the samples of a plane stand against ticks.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Stagger {
-    /// On ticks.
-    Whole = 0,
-    /// Half a tick later.
-    Half = 1,
+    edge: Edge,
+    /// Chips among which the bit changes.
+    signed: Box<ChipTable>,
 }
 
 impl Modulator {
-    pub(super) fn new(edges: Edges, scale: f64) -> Self {
-        let zeros = || Box::new([0.0; TABLE_CHIPS]);
+    pub(super) fn new(sampling: Sampling, scale: f64) -> Self {
         Self {
-            edges,
+            sampling,
             scale,
-            chips: zeros(),
-            middles: zeros(),
-            halves: zeros(),
+            edge: Edge::new(),
+            signed: Box::new(ChipTable::empty()),
         }
     }
 
-    /// Adds what `segment` has of the [`CHUNK`] (at most) of `range` to samples whose first one is
-    /// `tick`.
-    pub(super) fn add(
+    /// Adds what `segments` have to samples whose first one stands at half tick `first`.
+    pub(super) fn add_all<'a>(
         &mut self,
-        segment: &Segment,
-        tick: i64,
-        range: std::ops::Range<usize>,
-        stagger: Stagger,
+        segments: impl Iterator<Item = &'a Segment> + Clone,
+        first: i64,
         planes: &mut Planes,
     ) {
-        // Sample n of the planes stands at half tick 2 (tick + n) + stagger.
-        let index_of = |half: i64| {
-            let ticks = (half - stagger as i64 + 1).div_euclid(2);
-            (ticks - tick).clamp(range.start as i64, range.end as i64) as usize
-        };
-        let (begin, end) = (index_of(segment.begin), index_of(segment.end));
-        if begin >= end {
-            return;
-        }
-        let since = 2 * (tick + begin as i64) + stagger as i64 - segment.begin;
-        for ray in &segment.rays {
-            self.add_ray(segment, ray, since, begin..end, planes);
+        let length = planes.i.len();
+        // Even parts: none is short, at most rates none crosses into another millisecond.
+        let parts = length.div_ceil(CHUNK).max(1);
+        let chunk = length.div_ceil(parts).next_multiple_of(LANES).max(LANES);
+        for begin in (0..length).step_by(chunk) {
+            let range = begin..(begin + chunk).min(length);
+            for segment in segments.clone() {
+                self.add(segment, first, range.clone(), planes);
+            }
         }
     }
 
+    /// Adds what `segment` has of the samples in `range`.
+    fn add(
+        &mut self,
+        segment: &Segment,
+        first: i64,
+        range: std::ops::Range<usize>,
+        planes: &mut Planes,
+    ) {
+        let halves = self.sampling.halves();
+        let index_of = |half: i64| {
+            let samples = (half - first + halves - 1).div_euclid(halves);
+            samples.clamp(range.start as i64, range.end as i64) as usize
+        };
+        let (begin, end) = (index_of(segment.begin), index_of(segment.end));
+        for ray in &segment.rays {
+            let step = halves as u64 * ray.half_step;
+            let longest = ((MOST_CHIPS as f64 * CHIP / step as f64) as usize).max(1);
+            for begin in (begin..end).step_by(longest) {
+                let range = begin..(begin + longest).min(end);
+                let since = first + halves * begin as i64 - segment.begin;
+                self.add_ray(segment, ray, since, range, planes);
+            }
+        }
+    }
+
+    /// Adds the samples in `range` of a ray, the first of them `since` half ticks after its begin.
     fn add_ray(
         &mut self,
         segment: &Segment,
@@ -106,229 +120,296 @@ impl Modulator {
         range: std::ops::Range<usize>,
         planes: &mut Planes,
     ) {
-        let step = 2 * ray.half_step;
+        let halves = self.sampling.halves();
+        let step = halves as u64 * ray.half_step;
         let phase = ray.phase + since as u64 * ray.half_step;
-        // The table begins with the chip before that of the first sample.
+        // The chips begin with the one before that of the first sample.
         let first = (phase >> FRACTION_BITS) as usize - 1;
-        let count = (range.len() as f64 * step as f64 / CHIP) as usize + 4 + LANES;
-        self.fill(segment, ray, first, count.min(TABLE_CHIPS));
-        let phase = phase - ((first as u64) << FRACTION_BITS);
-        let samples = Samples {
+        let last = ((phase + (range.len() as u64 - 1) * step) >> FRACTION_BITS) as usize + 1;
+        let mut amplitude = self.scale * ray.amplitude;
+        let (code, at) = match constant_sign(&ray.bits, first, last) {
+            Some(sign) => {
+                amplitude *= f64::from(sign);
+                (&*segment.code, (ray.first_chip + first) % CODE_CHIPS)
+            }
+            None => {
+                let count = last + 1 - first;
+                self.signed
+                    .refill_signed(&segment.code, ray.first_chip, &ray.bits, first, count);
+                (&*self.signed, 0)
+            }
+        };
+        let sweep = Sweep {
+            // In chips of the table.
+            phase: phase - ((first as u64) << FRACTION_BITS) + ((at as u64) << FRACTION_BITS),
+            step,
+            carrier: Carrier::new(
+                amplitude,
+                ray.cycles + since as f64 * ray.half_cycles,
+                halves as f64 * ray.half_cycles,
+            ),
             i: &mut planes.i[range.clone()],
             q: &mut planes.q[range],
         };
-        let sweep = Sweep {
-            phase,
-            step,
-            carrier: Carrier::new(
-                ray.cycles + since as f64 * ray.half_cycles,
-                2.0 * ray.half_cycles,
-            ),
-            samples,
-        };
-        match self.edges {
-            Edges::Sharp => lanes::run(AddSharp {
-                sweep,
-                chips: &self.chips,
-            }),
-            Edges::Smooth => {
+        match self.sampling {
+            Sampling::Delivered => sweep.run(Sharp { chips: &code.chips }),
+            Sampling::Filtered => {
                 let width = (EDGE_HALF_WIDTH * ray.half_step as f64 / CHIP).min(0.5);
-                lanes::run(AddSmooth {
-                    sweep,
-                    middles: &self.middles,
-                    halves: &self.halves,
-                    per_width: (1.0 / width) as f32,
+                sweep.run(Smooth {
+                    middles: &code.middles,
+                    halves: &code.halves,
+                    edge: self.edge,
+                    per_width: (self.edge.reach / width) as f32,
                 });
             }
         }
     }
+}
 
-    /// Fills the tables with `count` chips of `ray` from number `first` on.
-    fn fill(&mut self, segment: &Segment, ray: &UniformRay, first: usize, count: usize) {
-        let (mut skip, mut filled) = (first, 0);
-        for &(run, sign) in &ray.bits {
-            let passed = skip.min(run);
-            skip -= passed;
-            let mut left = (run - passed).min(count - filled);
-            let level = sign * (self.scale * ray.amplitude) as f32;
-            while left > 0 {
-                let at = (ray.first_chip + first + filled) % segment.code.len();
-                let some = left.min(segment.code.len() - at);
-                let to = &mut self.chips[filled..filled + some];
-                for (out, chip) in to.iter_mut().zip(&segment.code[at..at + some]) {
-                    *out = level * f32::from(*chip);
-                }
-                filled += some;
-                left -= some;
-            }
+/// The sign of all chips from number `first` to `last`, in runs of `bits`; none where it changes.
+fn constant_sign(bits: &[(usize, f32)], first: usize, last: usize) -> Option<f32> {
+    let mut begin = 0;
+    for (run, sign) in bits {
+        let end = begin + run;
+        if first < end {
+            return (last < end).then_some(*sign);
         }
-        // Read beyond the last sample, and never seen.
-        self.chips[filled..count].fill(0.0);
-        if self.edges == Edges::Smooth {
-            let pairs = self.chips[..count].windows(2);
-            let tables = self.middles[1..].iter_mut().zip(&mut self.halves[1..]);
-            for (pair, (middle, half)) in pairs.zip(tables) {
-                *middle = 0.5 * (pair[1] + pair[0]);
-                *half = 0.5 * (pair[1] - pair[0]);
-            }
-        }
+        begin = end;
     }
+    None
 }
 
-struct Samples<'a> {
-    i: &'a mut [f32],
-    q: &'a mut [f32],
+/// What a signal is between its chips, before its carrier.
+trait Shape: Copy {
+    /// What eight consecutive chips have in common.
+    type Window<F: Floats>: Copy;
+    /// The shape in vectors, which finds its way from the chips with numbers `first` and after.
+    fn window<F: Floats>(self, first: usize) -> Self::Window<F>;
+    /// Values where code phases are so many chips ([`LANE_BITS`] of them behind the point) after
+    /// the begin of a window, less than eight.
+    fn values<F: Floats>(self, window: Self::Window<F>, chips: F::Words) -> F;
+    /// Phase at which a window's first entry is the one to take, chips in fixed point.
+    const AHEAD: u64;
 }
 
-/// A carrier: its phasor now, and those of the samples of a group against its first.
-struct Carrier {
-    phasor: (f64, f64),
-    group: (f64, f64),
-    cosines: [[f32; LANES]; VECTORS],
-    sines: [[f32; LANES]; VECTORS],
-}
-
-impl Carrier {
-    fn new(cycles: f64, step_cycles: f64) -> Self {
-        let phasor = |cycles: f64| {
-            let (sine, cosine) = (TAU * (cycles - cycles.round())).sin_cos();
-            (cosine, sine)
-        };
-        let step = phasor(step_cycles);
-        let mut carrier = Self {
-            phasor: phasor(cycles),
-            group: (1.0, 0.0),
-            cosines: [[0.0; LANES]; VECTORS],
-            sines: [[0.0; LANES]; VECTORS],
-        };
-        let cosines = carrier.cosines.as_flattened_mut().iter_mut();
-        for (cosine, sine) in cosines.zip(carrier.sines.as_flattened_mut()) {
-            (*cosine, *sine) = (carrier.group.0 as f32, carrier.group.1 as f32);
-            carrier.group = turn(carrier.group, step);
-        }
-        carrier
-    }
-}
-
-/// Product of two phasors.
-fn turn(a: (f64, f64), b: (f64, f64)) -> (f64, f64) {
-    (a.0 * b.0 - a.1 * b.1, a.1 * b.0 + a.0 * b.1)
-}
-
-/// One pass over samples: code phase (chips in fixed point, from the begin of a table) and carrier.
+/// One pass over samples: code phase (chips of a table, in fixed point) and carrier.
 struct Sweep<'a> {
     phase: u64,
     step: u64,
     carrier: Carrier,
-    samples: Samples<'a>,
+    i: &'a mut [f32],
+    q: &'a mut [f32],
 }
 
 impl Sweep<'_> {
-    /// Adds the carrier times `value_at` (chip number, and the fraction in each lane of a chip with
-    /// [`LANE_BITS`] behind the point) to every sample.
-    #[inline(always)]
-    fn add<F: Floats>(self, value_at: impl Fn(usize, F::Words) -> F) {
-        let Self {
-            mut phase,
-            step,
-            mut carrier,
-            samples,
-        } = self;
-        let shift = FRACTION_BITS - LANE_BITS as u32;
-        let ahead: [u32; LANES] = std::array::from_fn(|k| ((k as u64 * step) >> shift) as u32);
-        let ahead = F::Words::load(&ahead);
-        let mask = (1_u64 << FRACTION_BITS) - 1;
-        let (i, q) = (samples.i, samples.q);
-        let groups = i
-            .chunks_mut(VECTORS * LANES)
-            .zip(q.chunks_mut(VECTORS * LANES));
-        for (i, q) in groups {
-            let (c, s) = (
-                F::splat(carrier.phasor.0 as f32),
-                F::splat(carrier.phasor.1 as f32),
-            );
-            let rows = carrier.cosines.iter().zip(&carrier.sines);
-            let vectors = i.chunks_mut(LANES).zip(q.chunks_mut(LANES));
-            for ((i, q), (cosines, sines)) in vectors.zip(rows) {
-                let fraction = F::Words::splat(((phase & mask) >> shift) as u32);
-                let value = value_at((phase >> FRACTION_BITS) as usize, fraction + ahead);
-                phase = phase.wrapping_add(LANES as u64 * step);
-                let (cosines, sines) = (F::load(cosines), F::load(sines));
-                accumulate(i, value * (c * cosines - s * sines));
-                accumulate(q, value * (s * cosines + c * sines));
-            }
-            carrier.phasor = turn(carrier.phasor, carrier.group);
+    /// Adds the carrier times `shape` to every sample.
+    fn run(self, shape: impl Shape) {
+        // Vectors that share a window: they begin in its first chip and reach into its last.
+        let last = |vectors: u64| (vectors * LANES as u64 - 1) * self.step;
+        let reach = (LANES as u64 - 1) << FRACTION_BITS;
+        if last(4) < reach {
+            lanes::run(Add::<_, 4> { sweep: self, shape });
+        } else if last(2) < reach {
+            lanes::run(Add::<_, 2> { sweep: self, shape });
+        } else {
+            lanes::run(Add::<_, 1> { sweep: self, shape });
         }
     }
 }
 
-/// Adds a vector to samples, which may be fewer at the end.
-#[inline(always)]
-fn accumulate<F: Floats>(samples: &mut [f32], value: F) {
-    if let Ok(whole) = <&mut [f32; LANES]>::try_from(&mut *samples) {
-        (F::load(whole) + value).store(whole);
-    } else {
-        let mut values = [0.0; LANES];
-        value.store(&mut values);
-        for (sample, value) in samples.iter_mut().zip(values) {
-            *sample += value;
-        }
-    }
-}
-
-/// Eight entries from `at` on.
-#[inline(always)]
-fn window(table: &[f32; TABLE_CHIPS], at: usize) -> &[f32; LANES] {
-    // Never beyond the end for want of chips; a shorter table would repeat its last ones.
-    let at = at.min(TABLE_CHIPS - LANES);
-    table[at..].first_chunk().unwrap_or(&[0.0; LANES])
-}
-
-struct AddSharp<'a> {
+/// A [`Sweep`] in which `SHARING` vectors share a window of chips.
+struct Add<'a, S, const SHARING: usize> {
     sweep: Sweep<'a>,
-    chips: &'a [f32; TABLE_CHIPS],
+    shape: S,
 }
 
-impl Kernel for AddSharp<'_> {
+impl<S: Shape, const SHARING: usize> Kernel for Add<'_, S, SHARING> {
     #[inline(always)]
     fn run<F: Floats>(self) {
-        let chips = self.chips;
-        self.sweep.add::<F>(
-            #[inline(always)]
-            |chip, fraction| fraction.right::<LANE_BITS>().pick(window(chips, chip)),
-        );
+        let Self {
+            sweep:
+                Sweep {
+                    phase,
+                    step,
+                    carrier,
+                    i,
+                    q,
+                },
+            shape,
+        } = self;
+        let ahead = |row: usize| {
+            let lane = |k: usize| (row * LANES + k) as u64 * step;
+            F::Words::load(&std::array::from_fn(|k| (lane(k) >> LANE_SHIFT) as u32))
+        };
+        let mut groups = Groups {
+            phase: phase + S::AHEAD,
+            step: SHARING as u64 * LANES as u64 * step,
+            carrier,
+            ahead: std::array::from_fn::<_, SHARING, _>(ahead),
+        };
+        let (whole_i, rest_i) = i.as_chunks_mut::<GROUP>();
+        let (whole_q, rest_q) = q.as_chunks_mut::<GROUP>();
+        for (i, q) in whole_i.iter_mut().zip(whole_q) {
+            groups.add(i, q, shape);
+        }
+        if !rest_i.is_empty() {
+            let (mut i, mut q) = ([0.0; GROUP], [0.0; GROUP]);
+            i[..rest_i.len()].copy_from_slice(rest_i);
+            q[..rest_q.len()].copy_from_slice(rest_q);
+            groups.add(&mut i, &mut q, shape);
+            rest_i.copy_from_slice(&i[..rest_i.len()]);
+            rest_q.copy_from_slice(&q[..rest_q.len()]);
+        }
     }
 }
 
-struct AddSmooth<'a> {
-    sweep: Sweep<'a>,
-    middles: &'a [f32; TABLE_CHIPS],
-    halves: &'a [f32; TABLE_CHIPS],
-    /// One over half the width of an edge, 1/chips.
+/// From the fraction bits of a phase to those in a lane.
+const LANE_SHIFT: u32 = FRACTION_BITS - LANE_BITS as u32;
+
+/// Where a [`Sweep`] stands.
+struct Groups<W, const SHARING: usize> {
+    phase: u64,
+    /// Advance from one window to the next.
+    step: u64,
+    carrier: Carrier,
+    /// Advance of each lane over the first, by vector.
+    ahead: [W; SHARING],
+}
+
+impl<W: Words, const SHARING: usize> Groups<W, SHARING> {
+    #[inline(always)]
+    fn add(&mut self, i: &mut [f32; GROUP], q: &mut [f32; GROUP], shape: impl Shape) {
+        let mask = (1_u64 << FRACTION_BITS) - 1;
+        let (cosine, sine) = self.carrier.next();
+        let (c, s) = (W::Floats::splat(cosine), W::Floats::splat(sine));
+        let minus_s = W::Floats::splat(-sine);
+        let (i, q) = (i.as_chunks_mut::<LANES>().0, q.as_chunks_mut::<LANES>().0);
+        for first in (0..VECTORS).step_by(SHARING) {
+            let begin = W::splat(((self.phase & mask) >> LANE_SHIFT) as u32);
+            let window = shape.window::<W::Floats>((self.phase >> FRACTION_BITS) as usize);
+            self.phase = self.phase.wrapping_add(self.step);
+            for (row, ahead) in self.ahead.iter().enumerate() {
+                let value = shape.values(window, begin + *ahead);
+                let k = first + row;
+                let cosines = W::Floats::load(&self.carrier.cosines[k]);
+                let sines = W::Floats::load(&self.carrier.sines[k]);
+                let (i, q) = (&mut i[k], &mut q[k]);
+                let re = minus_s.fused(sines, c * cosines);
+                let im = s.fused(cosines, c * sines);
+                value.fused(re, W::Floats::load(i)).store(i);
+                value.fused(im, W::Floats::load(q)).store(q);
+            }
+        }
+    }
+}
+
+/// The chip of the instant.
+#[derive(Clone, Copy)]
+struct Sharp<'a> {
+    chips: &'a Table,
+}
+
+impl Shape for Sharp<'_> {
+    type Window<F: Floats> = F;
+    const AHEAD: u64 = 0;
+
+    #[inline(always)]
+    fn window<F: Floats>(self, first: usize) -> F {
+        F::load(window(self.chips, first))
+    }
+
+    #[inline(always)]
+    fn values<F: Floats>(self, window: F, chips: F::Words) -> F {
+        chips.right::<LANE_BITS>().pick(window)
+    }
+}
+
+/// [`EDGE`] in the variable y = x (-d)^(1/7), which spares the last coefficient: it is -1.
+#[derive(Debug, Clone, Copy)]
+struct Edge {
+    /// y at the end of an edge.
+    reach: f64,
+    /// Coefficients of y, y^3, y^5.
+    coefficients: [f32; 3],
+}
+
+impl Edge {
+    fn new() -> Self {
+        let reach = (-EDGE[3]).powf(1.0 / 7.0);
+        let coefficient = |k: usize| (EDGE[k] / reach.powi(2 * k as i32 + 1)) as f32;
+        Self {
+            reach,
+            coefficients: std::array::from_fn(coefficient),
+        }
+    }
+}
+
+/// Chips with smooth edges.
+#[derive(Clone, Copy)]
+struct Smooth<'a> {
+    middles: &'a Table,
+    halves: &'a Table,
+    edge: Edge,
+    /// Distance from the edge in y over that in chips.
     per_width: f32,
 }
 
-impl Kernel for AddSmooth<'_> {
+impl Shape for Smooth<'_> {
+    /// Middles and halves.
+    type Window<F: Floats> = (F, F);
+    /// The nearest edge is the one before half a chip on.
+    const AHEAD: u64 = 1 << (FRACTION_BITS - 1);
+
     #[inline(always)]
-    fn run<F: Floats>(mut self) {
-        let (middles, halves) = (self.middles, self.halves);
-        // The nearest edge is the one before half a chip on.
-        self.sweep.phase += 1 << (FRACTION_BITS - 1);
+    fn window<F: Floats>(self, first: usize) -> (F, F) {
+        (
+            F::load(window(self.middles, first)),
+            F::load(window(self.halves, first)),
+        )
+    }
+
+    #[inline(always)]
+    fn values<F: Floats>(self, (middles, halves): (F, F), chips: F::Words) -> F {
+        let mask = F::Words::splat((1 << LANE_BITS) - 1);
         let to_width = F::splat(self.per_width / (1 << LANE_BITS) as f32);
         let half_chip = F::splat(-0.5 * self.per_width);
-        let (low, high) = (F::splat(-1.0), F::splat(1.0));
-        let [a, b, c, d] = EDGE.map(|coefficient| F::splat(coefficient as f32));
-        let mask = F::Words::splat((1 << LANE_BITS) - 1);
-        self.sweep.add::<F>(
-            #[inline(always)]
-            |chip, fraction| {
-                let index = fraction.right::<LANE_BITS>();
-                let x = (fraction & mask).to_floats() * to_width + half_chip;
-                let x = x.min(high).max(low);
-                let x2 = x * x;
-                let step = (((d * x2 + c) * x2 + b) * x2 + a) * x;
-                index.pick(window(middles, chip)) + index.pick(window(halves, chip)) * step
-            },
-        );
+        let reach = self.edge.reach as f32;
+        let [a, b, c] = self.edge.coefficients.map(F::splat);
+
+        let y = (chips & mask).to_floats().fused(to_width, half_chip);
+        let y = y.min(F::splat(reach)).max(F::splat(-reach));
+        let y2 = y * y;
+        let slope = (c - y2).fused(y2, b).fused(y2, a);
+        let index = chips.right::<LANE_BITS>();
+        (index.pick(halves) * y).fused(slope, index.pick(middles))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_edge_is_its_polynomial() {
+        let edge = Edge::new();
+        for k in -10..=10 {
+            let x = f64::from(k) / 10.0;
+            let powers = [x, x.powi(3), x.powi(5), x.powi(7)];
+            let expected: f64 = powers.iter().zip(EDGE).map(|(x, c)| x * c).sum();
+            let y = x * edge.reach;
+            let [a, b, c] = edge.coefficients.map(f64::from);
+            let found = y * (a + y * y * (b + y * y * (c - y * y)));
+            // Coefficients of up to 6 in single precision.
+            assert!((found - expected).abs() < 2e-6, "{found} at {x}");
+        }
+    }
+
+    #[test]
+    fn a_bit_is_constant_up_to_its_last_chip() {
+        let bits = [(5, -1.0), (100, 1.0)];
+        assert_eq!(constant_sign(&bits, 0, 4), Some(-1.0));
+        assert_eq!(constant_sign(&bits, 0, 5), None);
+        assert_eq!(constant_sign(&bits, 5, 104), Some(1.0));
+        assert_eq!(constant_sign(&bits, 50, 105), None);
     }
 }

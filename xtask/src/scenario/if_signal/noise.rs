@@ -69,8 +69,8 @@ impl Kernel for AddNoise<'_> {
             let (i, q) = (i.as_chunks_mut::<LANES>().0, q.as_chunks_mut::<LANES>().0);
             for (pair, (i, q)) in words.chunks_exact(2).zip(i.iter_mut().zip(q)) {
                 let (a, b) = normal::<F>(pair[0], pair[1]);
-                (F::load(i) + a * deviation).store(i);
-                (F::load(q) + b * deviation).store(q);
+                a.fused(deviation, F::load(i)).store(i);
+                b.fused(deviation, F::load(q)).store(q);
             }
             counter = counter.wrapping_add(LANES as u64);
         }
@@ -129,11 +129,11 @@ fn logarithm<F: Floats>(x: F) -> F {
     let one = F::splat(1.0);
     let s = (m - one).over(m + one);
     let s2 = s * s;
-    let series = F::splat(2.0 / 9.0) * s2 + F::splat(2.0 / 7.0);
-    let series = series * s2 + F::splat(2.0 / 5.0);
-    let series = series * s2 + F::splat(2.0 / 3.0);
-    let series = series * s2 + F::splat(2.0);
-    exponent * F::splat(std::f32::consts::LN_2) + series * s
+    let series = F::splat(2.0 / 9.0).fused(s2, F::splat(2.0 / 7.0));
+    let series = series.fused(s2, F::splat(2.0 / 5.0));
+    let series = series.fused(s2, F::splat(2.0 / 3.0));
+    let series = series.fused(s2, F::splat(2.0));
+    exponent.fused(F::splat(std::f32::consts::LN_2), series * s)
 }
 
 /// Cosine and sine of an angle from -pi/4 to pi/4 that a word, taken as `i32`, stands for, to
@@ -143,14 +143,14 @@ fn quarter<F: Floats>(word: F::Words) -> (F, F) {
     let x = word.to_floats() * F::splat(FRAC_PI_4 / (1_u64 << 31) as f32);
     let x2 = x * x;
     let one = F::splat(1.0);
-    let sine = x2 * F::splat(1.0 / 362_880.0) - F::splat(1.0 / 5040.0);
-    let sine = sine * x2 + F::splat(1.0 / 120.0);
-    let sine = sine * x2 - F::splat(1.0 / 6.0);
-    let sine = (sine * x2 + one) * x;
-    let cosine = x2 * F::splat(1.0 / 40_320.0) - F::splat(1.0 / 720.0);
-    let cosine = cosine * x2 + F::splat(1.0 / 24.0);
-    let cosine = cosine * x2 - F::splat(0.5);
-    (cosine * x2 + one, sine)
+    let sine = x2.fused(F::splat(1.0 / 362_880.0), F::splat(-1.0 / 5040.0));
+    let sine = sine.fused(x2, F::splat(1.0 / 120.0));
+    let sine = sine.fused(x2, F::splat(-1.0 / 6.0));
+    let sine = sine.fused(x2, one) * x;
+    let cosine = x2.fused(F::splat(1.0 / 40_320.0), F::splat(-1.0 / 720.0));
+    let cosine = cosine.fused(x2, F::splat(1.0 / 24.0));
+    let cosine = cosine.fused(x2, F::splat(-0.5));
+    (cosine.fused(x2, one), sine)
 }
 
 #[cfg(test)]

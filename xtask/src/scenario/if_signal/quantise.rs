@@ -3,6 +3,8 @@
 use anyhow::{Result, ensure};
 use gnss_signal::sample::SampleFormat;
 
+use super::lanes::{self, Floats, Kernel};
+
 /// Rms of a component in 8-bit units: clipping lies at 4.5 standard deviations, rounding costs
 /// 0.0005 dB.
 pub(in crate::scenario) const RMS_8_BIT: f32 = 28.0;
@@ -101,74 +103,141 @@ impl Quantiser {
     /// Appends components in units of their rms. What does not fill a byte is padded with zeros:
     /// only the last call may end so.
     pub(super) fn append(&self, components: &[f32], out: &mut Vec<u8>) {
-        use Order::MostSignificantFirst;
-        match self.layout {
+        lanes::run(Append {
+            quantiser: self,
+            components,
+            out,
+        });
+    }
+}
+
+struct Append<'a> {
+    quantiser: &'a Quantiser,
+    components: &'a [f32],
+    out: &'a mut Vec<u8>,
+}
+
+impl Kernel for Append<'_> {
+    #[inline(always)]
+    fn run<F: Floats>(self) {
+        let Self {
+            quantiser,
+            components,
+            out,
+        } = self;
+        let levels = quantiser.levels;
+        match quantiser.layout {
             Layout::Float32 => out.extend(components.iter().flat_map(|x| x.to_le_bytes())),
-            Layout::Int16 => self.each(components, |level| {
-                out.extend_from_slice(&(level as i16).to_le_bytes());
+            Layout::Int16 => levels.each::<2>(components, out, |level| {
+                (low_bits(level) as u16).to_le_bytes()
             }),
-            Layout::Byte(offset) => {
-                let start = out.len();
-                out.resize(start + components.len(), 0);
-                let mut bytes = out[start..].iter_mut();
-                self.each(components, |level| {
-                    if let Some(byte) = bytes.next() {
-                        *byte = (level as i8).wrapping_add(offset) as u8;
-                    }
-                });
-            }
-            Layout::Sign(order) => {
-                let reversed = order == MostSignificantFirst;
-                out.extend(components.chunks(8).map(|eight| {
-                    let bits = eight.iter().enumerate();
-                    let byte = bits.fold(0, |byte, (k, x)| byte | u8::from(*x >= 0.0) << k);
-                    if reversed { byte.reverse_bits() } else { byte }
-                }));
-            }
-            Layout::TwosComplement2(order) => {
-                // -3, -1, 1, 3 are -2, -1, 0, 1.
-                self.pairs(components, order, out, |level| (level as i8 >> 1) as u8 & 3);
-            }
-            Layout::SignMagnitude(order) => self.pairs(components, order, out, |level| {
+            Layout::Byte(offset) => levels.each::<1>(components, out, |level| {
+                [(low_bits(level) as u8).wrapping_add(offset as u8)]
+            }),
+            Layout::Sign(order) => packed::<8>(components, out, order, |x| u8::from(x >= 0.0)),
+            // -3, -1, 1, 3 are -2, -1, 0, 1.
+            Layout::TwosComplement2(order) => levels.pack(components, out, order, |level| {
+                (low_bits(level) as u8 >> 1) & 3
+            }),
+            Layout::SignMagnitude(order) => levels.pack(components, out, order, |level| {
                 u8::from(level < 0.0) << 1 | u8::from(level.abs() > 1.0)
             }),
         }
     }
+}
 
-    /// Calls `write` with every level.
-    fn each(&self, components: &[f32], mut write: impl FnMut(f32)) {
-        match self.levels {
-            Levels::Float => components.iter().for_each(|x| write(*x)),
-            Levels::Integers { per_rms, largest } => components
-                .iter()
-                .for_each(|x| write(nearest((x * per_rms).clamp(-largest, largest)))),
-            Levels::Odd { per_rms, largest } => components
-                .iter()
-                .for_each(|x| write((2.0 * (x * per_rms).floor() + 1.0).clamp(-largest, largest))),
+impl Levels {
+    /// Appends `N` bytes for every level.
+    #[inline(always)]
+    fn each<const N: usize>(
+        self,
+        components: &[f32],
+        out: &mut Vec<u8>,
+        write: impl Fn(f32) -> [u8; N],
+    ) {
+        let start = out.len();
+        out.resize(start + N * components.len(), 0);
+        let (places, _) = out[start..].as_chunks_mut::<N>();
+        let pairs = places.iter_mut().zip(components);
+        match self {
+            Self::Float => pairs.for_each(|(place, x)| *place = write(*x)),
+            Self::Integers { per_rms, largest } => {
+                pairs.for_each(|(place, x)| *place = write(integer(*x, per_rms, largest)));
+            }
+            Self::Odd { per_rms, largest } => {
+                pairs.for_each(|(place, x)| *place = write(odd(*x, per_rms, largest)));
+            }
         }
     }
 
-    fn pairs(&self, components: &[f32], order: Order, out: &mut Vec<u8>, code: impl Fn(f32) -> u8) {
-        for four in components.chunks(4) {
-            let (mut byte, mut k) = (0, 0);
-            self.each(four, |level| {
-                let shift = match order {
-                    Order::MostSignificantFirst => 6 - 2 * k,
-                    Order::LeastSignificantFirst => 2 * k,
-                };
-                byte |= code(level) << shift;
-                k += 1;
-            });
-            out.push(byte);
+    /// Appends levels of two bits, four to a byte.
+    #[inline(always)]
+    fn pack(self, components: &[f32], out: &mut Vec<u8>, order: Order, code: impl Fn(f32) -> u8) {
+        // Two bits have odd levels.
+        if let Self::Odd { per_rms, largest } = self {
+            packed::<4>(components, out, order, |x| code(odd(x, per_rms, largest)));
         }
     }
 }
 
+/// Appends codes of `8 / N` bits, `N` to a byte.
+#[inline(always)]
+fn packed<const N: usize>(
+    components: &[f32],
+    out: &mut Vec<u8>,
+    order: Order,
+    code: impl Fn(f32) -> u8,
+) {
+    /// Bytes made together: their codes stay in the nearest cache.
+    const TOGETHER: usize = 128;
+    let bits = 8 / N;
+    let mut codes = [[0_u8; N]; TOGETHER];
+    for components in components.chunks(N * TOGETHER) {
+        let bytes = components.len().div_ceil(N);
+        let flat = codes.as_flattened_mut();
+        for (code_at, x) in flat.iter_mut().zip(components) {
+            *code_at = code(*x);
+        }
+        flat[components.len()..].fill(0);
+        out.extend(codes[..bytes].iter().map(|codes| {
+            let places = codes.iter().enumerate();
+            places.fold(0, |byte, (k, code)| {
+                byte | match order {
+                    Order::LeastSignificantFirst => code << (bits * k),
+                    Order::MostSignificantFirst => code << (8 - bits * (k + 1)),
+                }
+            })
+        }));
+    }
+}
+
+/// The nearest integer to a number times `per_rms`, at most `largest`.
+#[inline(always)]
+fn integer(x: f32, per_rms: f32, largest: f32) -> f32 {
+    nearest((x * per_rms).clamp(-largest, largest))
+}
+
+/// The odd integer as far from 0 as a number in steps, at most `largest`.
+#[inline(always)]
+fn odd(x: f32, per_rms: f32, largest: f32) -> f32 {
+    (2.0 * (x * per_rms).floor() + 1.0).clamp(-largest, largest)
+}
+
+/// What added to a number below 2^22 leaves its nearest integer in the lowest bits.
+const HOLDS_INTEGERS: f32 = 12_582_912.0;
+
 /// The nearest integer (an even one half way) to a number below 2^22: what adding and taking off
 /// 3 2^22 leaves, on every processor in two instructions.
+#[inline(always)]
 fn nearest(x: f32) -> f32 {
-    const HOLDS_INTEGERS: f32 = 12_582_912.0;
     x + HOLDS_INTEGERS - HOLDS_INTEGERS
+}
+
+/// The lowest bits of an integer below 2^22 in two's complement (more cheaply than by `as`, which
+/// looks for numbers too large).
+#[inline(always)]
+fn low_bits(integer: f32) -> u32 {
+    (integer + HOLDS_INTEGERS).to_bits()
 }
 
 #[cfg(test)]
@@ -266,6 +335,13 @@ mod tests {
             (SampleFormat::Cf32Le, 8),
         ] {
             assert!(Quantiser::new(format, Some(bits)).is_err(), "{format}");
+        }
+    }
+
+    #[test]
+    fn low_bits_are_those_of_the_integer() {
+        for integer in [-32_767_i16, -128, -3, -1, 0, 1, 5, 127, 32_767] {
+            assert_eq!(low_bits(f32::from(integer)) as u16 as i16, integer);
         }
     }
 

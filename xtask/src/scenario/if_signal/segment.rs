@@ -7,6 +7,7 @@ use anyhow::{Result, ensure};
 use gnss_nav::GpsTime;
 use gnss_signal::ranging_code;
 
+use super::chips::ChipTable;
 use super::grid::{Grid, HALVES};
 use crate::scenario::antenna::{Emitter, Ray};
 
@@ -29,8 +30,8 @@ pub(super) struct Segment {
     pub(super) begin: i64,
     /// First half tick of the next.
     pub(super) end: i64,
-    /// One code period, of +1 and -1.
-    pub(super) code: &'static [i8; 1023],
+    /// Its code.
+    pub(super) code: Arc<ChipTable>,
     /// Its rays.
     pub(super) rays: Vec<UniformRay>,
 }
@@ -57,6 +58,7 @@ pub(super) struct UniformRay {
 /// An emitter on the grid of samples; segments are asked for in order.
 pub(super) struct Track {
     emitter: Box<dyn Emitter>,
+    code: Arc<ChipTable>,
     grid: Grid,
     segment_halves: i64,
     /// Edges, with their first half tick.
@@ -78,6 +80,7 @@ impl Track {
         let edges = edges_s.iter().map(|&t| (grid.first_half(t), t)).collect();
         let segment_halves = (SEGMENT_S * grid.sample_rate_hz) as i64 * HALVES;
         Ok(Self {
+            code: Arc::new(ChipTable::of(ranging_code(emitter.signal()))),
             emitter,
             grid,
             segment_halves,
@@ -144,7 +147,7 @@ impl Track {
         Ok(Segment {
             begin,
             end,
-            code: ranging_code(self.emitter.signal()),
+            code: Arc::clone(&self.code),
             rays,
         })
     }
@@ -192,7 +195,7 @@ fn uniform(emitter: &mut dyn Emitter, begin: &Ray, end: &Ray, halves: f64) -> Re
         phase: ((since_second - chip as f64 + 1.0) * CHIP).round() as u64,
         half_step: (chips / halves * CHIP).round() as u64,
         bits: bits(emitter, second, before, wanted, chips_per_bit)?,
-        cycles: from.carrier_cycles.rem_euclid(1.0),
+        cycles: from.carrier_cycles - from.carrier_cycles.floor(),
         half_cycles: cycles / halves,
     })
 }

@@ -197,8 +197,12 @@ impl Receiving {
             (i, q) = (q, i);
         }
         if complex {
-            components.reserve(2 * run.samples);
-            components.extend(i.iter().zip(q).flat_map(|(i, q)| [*i, *q]));
+            let start = components.len();
+            components.resize(start + 2 * run.samples, 0.0);
+            let pairs = components[start..].as_chunks_mut().0.iter_mut();
+            for (pair, (i, q)) in pairs.zip(i.iter().zip(q)) {
+                *pair = [*i, *q];
+            }
         } else {
             components.extend_from_slice(i);
         }
