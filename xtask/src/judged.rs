@@ -6,8 +6,9 @@ use std::sync::{Mutex, PoisonError};
 use anyhow::Result;
 use gnss_nav::Geodetic;
 use gnss_nav::constants::SPEED_OF_LIGHT_MPS;
+use gnss_signal::sample::{ReaderSource, SampleSource};
 use gnss_signal::{CorrelatorBank, IfCorrelatorBank, InstructionSet};
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 use receiver::pipeline::{self, Aiding, Settings};
 use receiver::record::{ChannelRecord, Event, PvtRecord, Record, Status};
 
@@ -47,6 +48,24 @@ impl JudgedEpoch {
     #[must_use]
     pub fn horizontal_m(&self) -> f64 {
         self.position_enu_m.xy().norm()
+    }
+
+    /// Position error, ECEF, m.
+    #[must_use]
+    pub fn position_ecef_m(&self) -> Vector3<f64> {
+        self.ecef_from_enu() * self.position_enu_m
+    }
+
+    /// Velocity error, ECEF, m/s.
+    #[must_use]
+    pub fn velocity_ecef_mps(&self) -> Vector3<f64> {
+        self.ecef_from_enu() * self.velocity_enu_mps
+    }
+
+    /// East, north and up turn by less than 1e-4 from the solution to the truth 600 m away.
+    fn ecef_from_enu(&self) -> Matrix3<f64> {
+        let here = Geodetic::from_ecef(&self.pvt.position_ecef_m);
+        here.enu_from_ecef().transpose()
     }
 }
 
@@ -109,6 +128,45 @@ pub fn receive(scenario: &Scenario, level: Level, settings: &Settings) -> Result
             let source = Synthesiser::new(scene)?;
             let bank = IfCorrelatorBank::new(source, HISTORY_S, InstructionSet::detect())?;
             run(scenario, bank, settings)
+        }
+    }
+}
+
+/// Receives `scenario`, made once at `level`, with each of `settings`.
+///
+/// Samples are kept in memory: 4 MB/s at 16 MHz and 2 bits.
+///
+/// # Errors
+/// Where the signal cannot be made or a receiver fails.
+pub fn receive_by_each(
+    scenario: &Scenario,
+    level: Level,
+    settings: &[Settings],
+) -> Result<Vec<Judged>> {
+    if level == Level::Correlator {
+        return settings
+            .iter()
+            .map(|s| receive(scenario, level, s))
+            .collect();
+    }
+    let mut source = Synthesiser::new(scenario.scene())?;
+    let description = source.description();
+    let samples = all_bytes(&mut source)?;
+    let receive = |settings| {
+        let source = ReaderSource::new(samples.as_slice(), description);
+        let bank = IfCorrelatorBank::new(source, HISTORY_S, InstructionSet::detect())?;
+        run(scenario, bank, settings)
+    };
+    settings.iter().map(receive).collect()
+}
+
+fn all_bytes(source: &mut impl SampleSource) -> Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    let mut block = vec![0; 1 << 20];
+    loop {
+        match source.read(&mut block)? {
+            0 => return Ok(bytes),
+            n => bytes.extend_from_slice(&block[..n]),
         }
     }
 }

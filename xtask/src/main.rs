@@ -9,8 +9,9 @@ use clap::{Parser, Subcommand};
 use xtask::ci::ci;
 use xtask::code_noise::{self, Experiment, Parts};
 use xtask::demo::demo;
-use xtask::reproduce::{Paper, reproduce};
+use xtask::reproduce::{Making, Paper, reproduce};
 use xtask::scenario::command::{self as scenario, Command};
+use xtask::scenario::make::Level;
 use xtask::tidy::{Severity, tidy, workspace_root};
 use xtask::validate::{front_ends, levels};
 
@@ -68,6 +69,12 @@ enum Task {
         /// Which paper.
         #[arg(value_enum)]
         paper: Paper,
+        /// How signals are made [default: if for jiang2017, correlator for li2019]
+        #[arg(long, value_enum)]
+        level: Option<Level>,
+        /// Seeds of each scenario of jiang2017 and li2019 [default: 8]
+        #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+        seeds: Option<u16>,
         /// Folder that receives a folder of the paper's name.
         #[arg(long, value_name = "DIR", default_value = "reproduced")]
         out: PathBuf,
@@ -178,8 +185,14 @@ fn perform(task: Task) -> Result<ExitCode> {
             Ok(ExitCode::SUCCESS)
         }
         Task::Validate(validation) => validate(&validation, &mut out),
-        Task::Reproduce { paper, out: folder } => {
-            let outcome = reproduce(paper, &folder)?;
+        Task::Reproduce {
+            paper,
+            level,
+            seeds,
+            out: folder,
+        } => {
+            let seeds = seeds.map(usize::from);
+            let outcome = reproduce(paper, Making { level, seeds }, &folder)?;
             writeln!(out, "{outcome}")?;
             Ok(verdict(outcome.holds()))
         }

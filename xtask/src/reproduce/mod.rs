@@ -1,6 +1,10 @@
 //! Experiments of the papers, repeated: figures, tables, and what of them holds.
 
+pub mod chart;
+pub mod clock;
+pub mod jiang2017;
 mod outcome;
+pub mod report;
 pub mod wang2016;
 
 use std::path::Path;
@@ -9,6 +13,8 @@ use anyhow::{Result, bail};
 use clap::ValueEnum;
 
 pub use outcome::{Check, Outcome};
+
+use crate::scenario::make::Level;
 
 /// A paper by its key in docs/references.md.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -27,17 +33,27 @@ pub enum Paper {
     All,
 }
 
+/// How the signals of a reproduction are made, where there are signals.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Making {
+    /// Level; each reproduction has its own default.
+    pub level: Option<Level>,
+    /// Seeds of each scenario; likewise.
+    pub seeds: Option<usize>,
+}
+
 /// Repeats `paper` and writes its folder below `out`; tells whether every check holds.
 ///
 /// # Errors
 /// Where the paper cannot be repeated yet or a file cannot be written.
-pub fn reproduce(paper: Paper, out: &Path) -> Result<Outcome> {
+pub fn reproduce(paper: Paper, making: Making, out: &Path) -> Result<Outcome> {
     let outcome = match paper {
+        Paper::Jiang2017 => jiang2017::reproduce(making)?,
         Paper::Wang2016 => wang2016::reproduce()?,
-        Paper::Jiang2017 | Paper::Zhu2020 | Paper::Zhang2014 | Paper::Li2019 | Paper::All => {
+        Paper::Zhu2020 | Paper::Zhang2014 | Paper::Li2019 | Paper::All => {
             let name = paper.to_possible_value();
             let name = name.as_ref().map_or("this paper", |value| value.get_name());
-            bail!("reproduce {name}: not there yet, only wang2016 is");
+            bail!("reproduce {name}: not there yet; jiang2017, li2019 and wang2016 are");
         }
     };
     outcome.write(out)?;

@@ -32,6 +32,13 @@ pub struct CarrierBandwidth {
     pub frequency_hz: f64,
 }
 
+impl CarrierBandwidth {
+    /// The wider part, Hz.
+    pub(super) const fn largest_hz(self) -> f64 {
+        self.phase_hz.max(self.frequency_hz)
+    }
+}
+
 impl CarrierLoop {
     /// A loop at rest at `frequency_hz`.
     #[must_use]

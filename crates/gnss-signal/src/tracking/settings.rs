@@ -44,7 +44,8 @@ pub struct TrackingSettings {
     pub carrier_order: LoopOrder,
     /// Carrier loop before carrier lock. Default 10 Hz of phase and 4 Hz of frequency.
     pub pull_in_bandwidth: CarrierBandwidth,
-    /// Carrier loop in carrier lock. Default 10 Hz of phase alone.
+    /// Carrier loop in carrier lock. Default 10 Hz of phase alone. With frequency alone there is no carrier
+    /// lock: the channel is a frequency-locked loop, without bits, whose Doppler is the loop's.
     pub locked_bandwidth: CarrierBandwidth,
     /// Final code loop bandwidth in carrier lock, Hz. Default 0.05: the carrier takes the
     /// dynamics, what is left is ionospheric divergence.
@@ -88,6 +89,11 @@ impl Default for TrackingSettings {
 }
 
 impl TrackingSettings {
+    /// Whether the channel's own carrier loop ever locks to the phase.
+    pub(super) fn tracks_phase(&self) -> bool {
+        self.locked_bandwidth.phase_hz > 0.0
+    }
+
     /// These settings, if all are possible.
     ///
     /// # Errors
@@ -121,9 +127,10 @@ impl TrackingSettings {
             let value = self.spacing_chips.to_string();
             return refuse("tap spacing (chips)", value, "above 0 and at most 1");
         }
+        // A carrier loop may lack one of its two parts.
         let bandwidths = [
-            self.pull_in_bandwidth.phase_hz,
-            self.locked_bandwidth.phase_hz,
+            self.pull_in_bandwidth.largest_hz(),
+            self.locked_bandwidth.largest_hz(),
             self.code_locked_hz,
             self.code_unlocked_hz,
         ];

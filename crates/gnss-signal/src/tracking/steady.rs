@@ -307,6 +307,7 @@ impl Steady {
             .detector
             .update(prompt, strong_enough, interval_s, patience_s);
         self.lock = match &self.helm {
+            Helm::Own(_) if seen == Lock::Carrier && !self.settings.tracks_phase() => Lock::Code,
             Helm::Own(_) => seen,
             Helm::Navigation(steered) if !steered.presence.is_present() => Lock::Lost,
             Helm::Navigation(_) if seen == Lock::Carrier && self.follows_phase() => seen,
@@ -361,8 +362,10 @@ impl Steady {
         let s = &self.settings;
         let (carrier, code_hz) = if self.lock == Lock::Carrier {
             (s.locked_bandwidth, s.code_locked_hz)
-        } else {
+        } else if s.tracks_phase() {
             (s.pull_in_bandwidth, s.code_unlocked_hz)
+        } else {
+            (s.locked_bandwidth, s.code_unlocked_hz)
         };
         self.nco.doppler_hz = self
             .carrier
@@ -500,6 +503,11 @@ impl Steady {
             self.last_line = None;
             self.acceleration_hz_s = 0.0;
             let pair = (1.0 + 1.0 / snr) / snr / (std::f64::consts::TAU * interval_s).powi(2);
+            if !self.settings.tracks_phase() {
+                // What the loop lets through of it (Kaplan2017, jitter of a frequency-locked loop).
+                let passed = 4.0 * self.settings.locked_bandwidth.frequency_hz * interval_s;
+                return (self.nco.doppler_hz, passed * pair);
+            }
             return (self.nco.doppler_hz + frequency_error_hz, pair);
         };
         if let Some(before) = self.last_line.replace(line) {

@@ -16,6 +16,7 @@ use super::performance::{Performance, mean};
 use super::setting::STEPS_M;
 use super::study::{Case, SEEDS, Study, case};
 use crate::reproduce::Check;
+use crate::reproduce::report::checks_table;
 
 /// Statistics of a detector: what people read, and its index in the decisions.
 pub(super) fn statistics(case: &Case) -> Vec<(&'static str, usize)> {
@@ -128,15 +129,8 @@ pub fn report(study: &Study, calibrated: &Calibrated, checks: &[Check]) -> Resul
     text += &explanations(study)?;
     text += &comparison("Unstated choices, one after the other", SCAN, &study.scan);
     text += NOT_REPRODUCED;
-    text += "\n## Checks\n\n| check | paper | ours | holds |\n|---|---|---|---|\n";
-    for check in checks {
-        let paper = check
-            .paper
-            .map_or_else(|| "-".to_owned(), |paper| paper.to_string());
-        let (name, ours, unit) = (&check.name, check.ours, check.unit);
-        let holds = if check.holds { "yes" } else { "**no**" };
-        let _ = writeln!(text, "| {name} | {paper} | {ours:.3} {unit} | {holds} |");
-    }
+    text += "\n";
+    text += &checks_table(checks);
     Ok(text)
 }
 

@@ -1,0 +1,182 @@
+//! Charts of several lines over time, one above the other.
+
+use anyhow::{Result, anyhow};
+use plotters::prelude::*;
+
+/// Width of a picture and height of one of its charts, px.
+const WIDTH: u32 = 900;
+const HEIGHT: u32 = 340;
+/// Height of the title, px.
+const TITLE: u32 = 34;
+
+/// Red: what fails, or is compared against.
+pub const RED: RGBColor = RGBColor(200, 30, 30);
+/// Blue: what is proposed.
+pub const BLUE: RGBColor = RGBColor(30, 90, 180);
+/// Green: a third.
+pub const GREEN: RGBColor = RGBColor(30, 130, 60);
+/// Orange: a fourth.
+pub const ORANGE: RGBColor = RGBColor(220, 130, 0);
+
+/// How the points of a series are drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Mark {
+    /// Joined by a line.
+    Line,
+    /// Each by itself, so that what is missing shows.
+    Dots,
+}
+
+/// Points of one name and colour.
+#[derive(Debug, Clone)]
+pub struct Series {
+    /// What people read.
+    pub label: String,
+    /// Colour.
+    pub colour: RGBColor,
+    /// How the points are drawn.
+    pub mark: Mark,
+    /// Points, in the order in which they are joined.
+    pub points: Vec<(f64, f64)>,
+}
+
+/// One chart.
+#[derive(Debug, Clone)]
+pub struct Chart {
+    /// Above it.
+    pub caption: String,
+    /// Along it, with the unit.
+    pub x: &'static str,
+    /// Beside it, with the unit.
+    pub y: &'static str,
+    /// What it shows.
+    pub series: Vec<Series>,
+    /// Lines across at which something happens, by x.
+    pub marked: Vec<f64>,
+}
+
+type Drawn<T> = std::result::Result<T, Box<dyn std::error::Error>>;
+type Area<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
+
+/// An SVG of `charts` under one title.
+///
+/// # Errors
+/// Where it cannot be drawn.
+pub fn picture(title: &str, charts: &[Chart]) -> Result<String> {
+    draw(title, charts).map_err(|e| anyhow!("{title}: {e}"))
+}
+
+fn draw(title: &str, charts: &[Chart]) -> Drawn<String> {
+    let mut svg = String::new();
+    {
+        let height = TITLE + HEIGHT * charts.len() as u32;
+        let root = SVGBackend::with_string(&mut svg, (WIDTH, height)).into_drawing_area();
+        root.fill(&WHITE)?;
+        let below = root.titled(title, ("sans-serif", 20))?;
+        for (area, chart) in below.split_evenly((charts.len(), 1)).iter().zip(charts) {
+            draw_chart(area, chart)?;
+        }
+        root.present()?;
+    }
+    Ok(svg)
+}
+
+fn draw_chart(area: &Area<'_>, chart: &Chart) -> Drawn<()> {
+    let points = || chart.series.iter().flat_map(|s| &s.points);
+    let (x, y) = (range(points().map(|p| p.0)), range(points().map(|p| p.1)));
+    let margin = 0.06 * (y.1 - y.0);
+    let across = (y.0 - margin)..(y.1 + margin);
+    let mut drawing = ChartBuilder::on(area)
+        .caption(&chart.caption, ("sans-serif", 15))
+        .margin(10)
+        .x_label_area_size(36)
+        .y_label_area_size(64)
+        .build_cartesian_2d(x.0..x.1, across.clone())?;
+    let digits = digits(y.1 - y.0);
+    drawing
+        .configure_mesh()
+        .x_desc(chart.x)
+        .y_desc(chart.y)
+        .x_label_formatter(&|x| format!("{x:.0}"))
+        .y_label_formatter(&|y| format!("{y:.digits$}"))
+        .light_line_style(BLACK.mix(0.05))
+        .bold_line_style(BLACK.mix(0.12))
+        .draw()?;
+    for at in &chart.marked {
+        let ends = [(*at, across.start), (*at, across.end)];
+        drawing.draw_series(DashedLineSeries::new(ends, 6, 4, BLACK.stroke_width(1)))?;
+    }
+    for series in &chart.series {
+        let colour = series.colour;
+        let points = series.points.iter().copied();
+        let drawn = match series.mark {
+            Mark::Line => drawing.draw_series(LineSeries::new(points, colour.stroke_width(1)))?,
+            Mark::Dots => {
+                drawing.draw_series(points.map(|at| Circle::new(at, 2, colour.filled())))?
+            }
+        };
+        drawn
+            .label(&series.label)
+            .legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], colour.stroke_width(3)));
+    }
+    drawing
+        .configure_series_labels()
+        .position(SeriesLabelPosition::UpperLeft)
+        .background_style(WHITE.mix(0.85))
+        .border_style(BLACK.mix(0.2))
+        .label_font(("sans-serif", 13))
+        .draw()?;
+    Ok(())
+}
+
+/// Lowest and highest, never the same.
+fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
+    let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
+        (low.min(v), high.max(v))
+    });
+    if low < high {
+        (low, high)
+    } else if low == high {
+        (low - 1.0, high + 1.0)
+    } else {
+        (0.0, 1.0)
+    }
+}
+
+/// Decimals that tell the labels of a `span` apart.
+fn digits(span: f64) -> usize {
+    (1.0 - span.log10().floor()).clamp(0.0, 4.0) as usize
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_picture_names_what_it_shows() {
+        let chart = Chart {
+            caption: "Error".to_owned(),
+            x: "time (s)",
+            y: "error (m)",
+            series: vec![Series {
+                label: "ours".to_owned(),
+                colour: BLUE,
+                mark: Mark::Line,
+                points: vec![(0.0, 1.0), (1.0, 3.0)],
+            }],
+            marked: vec![0.5],
+        };
+        let svg = picture("Figure 1", &[chart.clone(), chart]).unwrap();
+        for text in ["Figure 1", "Error", "time (s)", "error (m)", "ours"] {
+            assert!(svg.contains(text), "{text}");
+        }
+    }
+
+    #[test]
+    fn labels_tell_ticks_apart_and_ranges_are_never_empty() {
+        assert_eq!([digits(250.0), digits(2.0), digits(0.03)], [0, 1, 3]);
+        assert_eq!(range([2.0].into_iter()), (1.0, 3.0));
+        assert_eq!(range(std::iter::empty()), (0.0, 1.0));
+        assert_eq!(range([3.0, -1.0].into_iter()), (-1.0, 3.0));
+    }
+}

@@ -1,0 +1,101 @@
+//! What is claimed of the runs.
+
+use super::receivers::Variant;
+use super::study::{Case, Run, Study};
+use crate::reproduce::Check;
+
+/// Error that the paper's receiver must exceed without detection, m.
+const LOST_M: f64 = 50.0;
+/// Largest error with detection, m, and the goal.
+const HELD_M: f64 = 3.0;
+/// What is aimed at, m.
+pub const GOAL_M: f64 = 1.0;
+/// Longest time from the blockage to the alarm, s.
+const ALARM_S: f64 = 0.1;
+
+/// Median; the mean of the middle two where their number is even, and NaN of none.
+#[must_use]
+pub fn median(values: impl Iterator<Item = f64>) -> f64 {
+    let mut sorted: Vec<f64> = values.collect();
+    sorted.sort_by(f64::total_cmp);
+    let middle = |k: usize| sorted.get(k).copied().unwrap_or(f64::NAN);
+    let half = sorted.len() / 2;
+    if sorted.len() % 2 == 1 {
+        middle(half)
+    } else {
+        (middle(half.wrapping_sub(1)) + middle(half)) / 2.0
+    }
+}
+
+/// Largest.
+#[must_use]
+pub fn largest(values: impl Iterator<Item = f64>) -> f64 {
+    values.fold(f64::NEG_INFINITY, f64::max)
+}
+
+/// Time from the blockage to the alarm, s: the monitor's, or the channel's that its signal is gone.
+#[must_use]
+pub fn alarm_delay_s(run: &Run, begin_s: f64) -> f64 {
+    let noticed = [run.excluded_s, run.lost_s].into_iter().flatten();
+    noticed.fold(f64::INFINITY, f64::min) - begin_s
+}
+
+/// All claims.
+#[must_use]
+pub fn checks(study: &Study) -> Vec<Check> {
+    study.cases.iter().flat_map(of_scenario).collect()
+}
+
+fn of_scenario(case: &Case) -> Vec<Check> {
+    let number = case.blockage.number;
+    let after = |variant| case.runs(variant).map(|run| run.after_m);
+    let mut checks = vec![Check::at_least(
+        format!(
+            "scenario {number}, paper baseline: median of the largest error after the blockage"
+        ),
+        median(after(Variant::Paper)),
+        LOST_M,
+        "m",
+    )];
+    for variant in Variant::ALL.into_iter().filter(|v| v.excludes()) {
+        checks.extend(with_exclusion(case, variant));
+    }
+    checks
+}
+
+fn with_exclusion(case: &Case, variant: Variant) -> [Check; 4] {
+    let blockage = &case.blockage;
+    let name = |what: &str| format!("scenario {}, {}: {what}", blockage.number, variant.label());
+    let runs = || case.runs(variant);
+    let worst_m = largest(runs().map(Run::largest_m));
+    let held = Check::at_most(name("largest error of any run"), worst_m, HELD_M, "m");
+    let delay_s = largest(runs().map(|run| alarm_delay_s(run, blockage.begin_s)));
+    let early = runs().map(|run| run.excluded_before as f64).sum();
+    let available = runs().map(|run| run.availability).fold(1.0, f64::min);
+    [
+        Check {
+            paper: Some(blockage.paper_m),
+            ..held
+        },
+        Check::at_most(
+            name("latest alarm after the blockage"),
+            delay_s,
+            ALARM_S,
+            "s",
+        ),
+        Check::at_most(name("exclusions before the blockage"), early, 0.0, ""),
+        Check::at_least(name("epochs with a solution"), available, 0.99, ""),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_median_lies_in_the_middle() {
+        assert_eq!(median([3.0, 1.0, 2.0].into_iter()), 2.0);
+        assert_eq!(median([4.0, 1.0, 2.0, 3.0].into_iter()), 2.5);
+        assert!(median(std::iter::empty()).is_nan());
+    }
+}
