@@ -551,7 +551,6 @@ fn costas_variance_cycles2(snr: f64) -> f64 {
     (1.0 + 0.5 / snr) / (2.0 * snr) / std::f64::consts::TAU.powi(2)
 }
 
-
 fn bit_periods(nco: &Nco) -> i64 {
     i64::from(nco.signal.spec().code_periods_per_bit)
 }
