@@ -30,7 +30,7 @@ fn defaults_are_filled_in() {
 #[test]
 fn impossible_values_are_named_with_what_was_expected() {
     type Change = fn(&mut RunOptions);
-    let cases: [(Change, &str); 12] = [
+    let cases: [(Change, &str); 13] = [
         (|o| o.rate = Some(0.0), "--rate is '0': expected above 0"),
         (
             |o| o.duration = Some(0.0),
@@ -53,8 +53,12 @@ fn impossible_values_are_named_with_what_was_expected() {
             "--prn is '1,40': expected GPS numbers 1 to 37",
         ),
         (
-            |o| o.mode = Some("vector".to_owned()),
-            "--mode is 'vector': expected scalar (the only",
+            |o| o.mode = Some("tensor".to_owned()),
+            "--mode is 'tensor': expected one of scalar, vector",
+        ),
+        (
+            |o| o.policy = Some("ignore".to_owned()),
+            "--policy is 'ignore': expected one of observe, deweight, exclude",
         ),
         (
             |o| o.time = Some("1672".to_owned()),
