@@ -1,0 +1,166 @@
+//! A steered channel on an ideal signal in noise.
+
+use super::super::channel::Channel;
+use super::super::simulated::IdealSignal;
+use super::super::{Lock, NoiseFloor, TrackingSettings};
+use super::*;
+use crate::{CorrelatorBank, SignalId};
+
+/// Steers a channel to the truth, off by an error, every 20 ms.
+struct Run {
+    signal: IdealSignal,
+    channel: Channel,
+    noise: NoiseFloor,
+    code_error_chips: f64,
+    doppler_error_hz: f64,
+}
+
+/// Mean and mean square over their variance of errors.
+#[derive(Default)]
+struct Tally {
+    count: f64,
+    sum: f64,
+    squares: f64,
+}
+
+impl Tally {
+    fn add(&mut self, error: f64, variance: f64) {
+        if variance.is_finite() {
+            self.count += 1.0;
+            self.sum += error / variance.sqrt();
+            self.squares += error * error / variance;
+        }
+    }
+
+    fn join(&mut self, other: &Self) {
+        self.count += other.count;
+        self.sum += other.sum;
+        self.squares += other.squares;
+    }
+
+    fn mean_square(&self) -> f64 {
+        self.squares / self.count
+    }
+}
+
+impl Run {
+    fn new(cn0_dbhz: f64, seed: u64, steered: SteeredSettings) -> Self {
+        let signal = IdealSignal::new(cn0_dbhz, seed);
+        let settings = TrackingSettings {
+            steered,
+            ..TrackingSettings::default()
+        };
+        let start = steering(&signal, 0, 0.0, 0.0);
+        // Code phase 5000.3 chips from the start of a bit at tick 0.
+        let channel = Channel::predicted(signal.signal, signal.front_end, settings, &start, 4);
+        let unused = SignalId::gps_l1_ca(37).unwrap();
+        Self {
+            noise: NoiseFloor::new(unused, signal.front_end).unwrap(),
+            signal,
+            channel,
+            code_error_chips: 0.0,
+            doppler_error_hz: 0.0,
+        }
+    }
+
+    /// Tracks from 0 to `end_s`; errors of code phase (chips) and Doppler (Hz) after `settled_s`.
+    fn errors(&mut self, settled_s: f64, end_s: f64) -> (Tally, Tally) {
+        let (mut code, mut doppler) = (Tally::default(), Tally::default());
+        let fs = self.signal.front_end.sample_rate_hz;
+        let mut taps = Vec::new();
+        for k in 1..=(end_s * 50.0) as u64 {
+            let tick = k * (fs / 50.0) as u64;
+            while let Some(replica) = self.channel.replica().filter(|r| r.end_tick <= tick) {
+                self.signal.correlate(&[replica], &mut taps).unwrap();
+                self.channel.update(&replica, &taps[0], &self.noise);
+            }
+            let epoch = self.channel.epoch(tick).unwrap();
+            let t = tick as f64 / fs;
+            if t > settled_s {
+                let error = epoch.code_phase_chips - self.signal.chips_at(t);
+                let error = (error + 511.5).rem_euclid(1023.0) - 511.5;
+                code.add(error, epoch.code_variance_chips2);
+                let truth = self.signal.doppler_hz + self.signal.doppler_rate_hz_s * t;
+                doppler.add(epoch.doppler_hz - truth, epoch.doppler_variance_hz2);
+            }
+            let wrong = if k % 2 == 0 { 1.0 } else { -1.0 };
+            let to = steering(
+                &self.signal,
+                tick,
+                wrong * self.code_error_chips,
+                wrong * self.doppler_error_hz,
+            );
+            assert!(self.channel.steer(&to));
+        }
+        (code, doppler)
+    }
+}
+
+fn steering(signal: &IdealSignal, tick: u64, code_error: f64, doppler_error: f64) -> Steering {
+    let t = tick as f64 / signal.front_end.sample_rate_hz;
+    let doppler_hz = signal.doppler_hz + signal.doppler_rate_hz_s * t + doppler_error;
+    Steering {
+        tick,
+        code_phase_chips: (signal.chips_at(t) + code_error).rem_euclid(1023.0),
+        code_rate_hz: 1.023e6 * (1.0 + doppler_hz / 1575.42e6),
+        doppler_hz,
+    }
+}
+
+#[test]
+fn errors_are_those_reported_from_strong_to_weak() {
+    // 4000 epochs: the mean square is good to 2.2 %; carrier errors are correlated over a tenth of a
+    // second, 5 %, and their variance is a rule of thumb. At
+    // 15 dB-Hz errors are cut where no signal would be seen, and smaller than reported.
+    let cases = [
+        (45.0, true, 0.9..1.1, 0.8..1.25),
+        (35.0, true, 0.9..1.1, 0.8..1.25),
+        (35.0, false, 0.9..1.1, 0.93..1.1),
+        (21.0, true, 0.9..1.1, 0.9..1.1),
+        (15.0, true, 0.6..1.0, 0.4..1.0),
+    ];
+    for (cn0_dbhz, carrier_phase, code_range, doppler_range) in cases {
+        let (mut code, mut doppler) = (Tally::default(), Tally::default());
+        for seed in 0..4 {
+            let steered = SteeredSettings {
+                carrier_phase,
+                ..SteeredSettings::default()
+            };
+            let mut run = Run::new(cn0_dbhz, seed, steered);
+            // Steered a little wrong, to and fro, as a filter would.
+            (run.code_error_chips, run.doppler_error_hz) = (0.01, 0.5);
+            let (c, d) = run.errors(5.0, 25.0);
+            code.join(&c);
+            doppler.join(&d);
+        }
+        let (c, d) = (code.mean_square(), doppler.mean_square());
+        assert!(code_range.contains(&c), "code {c} at {cn0_dbhz}");
+        assert!(doppler_range.contains(&d), "Doppler {d} at {cn0_dbhz}");
+        // Four deviations of a mean of 4000.
+        assert!((code.sum / code.count).abs() < 0.063, "{cn0_dbhz}");
+    }
+}
+
+#[test]
+fn equation_6_measures_the_doppler_too() {
+    let steered = SteeredSettings {
+        interval_periods: 10,
+        pairs: FrequencyPairs::Successive,
+        carrier_phase: false,
+        ..SteeredSettings::default()
+    };
+    let mut run = Run::new(45.0, 5, steered);
+    let (code, doppler) = run.errors(2.0, 12.0);
+    // 500 epochs: 6 %; the two pairs of an epoch share a sum and partly cancel.
+    assert!((0.75..1.25).contains(&code.mean_square()));
+    assert!((0.3..1.25).contains(&doppler.mean_square()));
+}
+
+#[test]
+fn a_signal_that_returns_is_taken_up_at_once() {
+    let mut run = Run::new(45.0, 11, SteeredSettings::default());
+    run.signal.ends_s = 3.0;
+    run.errors(0.0, 8.0);
+    assert_eq!(run.channel.lock(), Lock::Lost);
+    assert!(run.channel.is_steered() && run.channel.replica().is_some());
+}
