@@ -12,6 +12,7 @@ use crate::scenario::built::Scenario;
 use crate::scenario::catalogue;
 use crate::scenario::command::receive;
 use crate::scenario::make::Level;
+use crate::validate::verdict;
 
 /// Name of the scenario.
 const NAME: &str = "demo";
@@ -105,11 +106,7 @@ impl fmt::Display for Demo {
             self.wall_s,
             self.report.display()
         )?;
-        let verdict = if self.holds() {
-            "holds"
-        } else {
-            "does not hold"
-        };
+        let verdict = verdict(self.holds());
         write!(
             f,
             "bound {LARGEST_ERROR_M} m rms, first position by {LATEST_FIX_S} s: {verdict}"

@@ -6,6 +6,7 @@ use std::path::Path;
 use anyhow::{Context, Result};
 use receiver::summary::Summary;
 
+use super::verdict;
 use crate::scenario::built::Scenario;
 use crate::scenario::catalogue;
 use crate::scenario::command::receive;
@@ -140,11 +141,7 @@ impl fmt::Display for Table {
                 _ => writeln!(f, "none | | | |")?,
             }
         }
-        let verdict = if self.holds() {
-            "holds"
-        } else {
-            "does not hold"
-        };
+        let verdict = verdict(self.holds());
         write!(f, "bound {LARGEST_RMS_M} m rms: {verdict}")
     }
 }

@@ -11,6 +11,7 @@ use rand_chacha::ChaCha8Rng;
 use receiver::pipeline::{Aiding, Settings, run};
 use receiver::record::{EventKind, PvtRecord, Record};
 
+use super::verdict;
 use crate::scenario::built::Scenario;
 use crate::scenario::correlator_level::CorrelatorLevelBank;
 use crate::scenario::if_signal::{Options, Synthesiser};
@@ -232,11 +233,7 @@ impl fmt::Display for Comparison {
                 100.0 * error.error_m / error.rms_m
             )?;
         }
-        let verdict = if self.holds() {
-            "holds"
-        } else {
-            "does not hold"
-        };
+        let verdict = verdict(self.holds());
         write!(
             f,
             "{:+.2} standard errors apart; bounds 3, and 4 % each: {verdict}",

@@ -2,3 +2,8 @@
 
 pub mod front_ends;
 pub mod levels;
+
+/// A verdict in words.
+pub(crate) const fn verdict(holds: bool) -> &'static str {
+    if holds { "holds" } else { "does not hold" }
+}
