@@ -53,7 +53,7 @@ pub fn reproduce(paper: Paper, making: Making, out: &Path) -> Result<Outcome> {
         Paper::Zhu2020 | Paper::Zhang2014 | Paper::Li2019 | Paper::All => {
             let name = paper.to_possible_value();
             let name = name.as_ref().map_or("this paper", |value| value.get_name());
-            bail!("reproduce {name}: not there yet; jiang2017, li2019 and wang2016 are");
+            bail!("reproduce {name}: not there yet; jiang2017 and wang2016 are");
         }
     };
     outcome.write(out)?;

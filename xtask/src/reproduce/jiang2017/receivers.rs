@@ -31,7 +31,7 @@ const CLOCK: ClockNoise = ClockNoise {
 };
 /// Carrier loop of the receiver's own channels, Hz, and their integration, code periods: with 10 Hz the
 /// white frequency noise of this clock alone makes phases scatter by 30 degrees, and the loops slip.
-const CARRIER_HZ: f64 = 30.0;
+pub const CARRIER_HZ: f64 = 30.0;
 const OWN_PERIODS: u32 = 5;
 
 /// One receiver.
