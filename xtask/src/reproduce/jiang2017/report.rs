@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use serde_json::{Value, json};
 
 use super::checks::{GOAL_M, alarm_delay_s, largest, median};
-use super::receivers::{CARRIER_HZ, CHANNEL_DBHZ, CN0_DBHZ, INTERVAL_S, Variant};
+use super::receivers::{CARRIER_HZ, CN0_DBHZ, INTERVAL_S, Variant};
 use super::study::{Case, Run, SETTLING_S, Study};
 use crate::reproduce::Check;
 use crate::reproduce::report::checks_table;
@@ -68,7 +68,7 @@ fn introduction(study: &Study) -> String {
          S_g = 0.04 m^2/s^3. The blocked satellite's signal is gone and the receiver is not told. All receivers of a seed receive the same signal, \
          assisted, with q_a = 1 m^2/s^3.\n\n\
          - *Paper baseline*: updates every {INTERVAL_S} s, early and late 1 chip apart, frequency by equation (6) from successive sums, measurement \
-         noise fixed at what theory gives for the C/N0 before the blockage ({CHANNEL_DBHZ} dB-Hz in the channels: the front end takes 2 dB), no gate, \
+         noise fixed at what theory gives for the C/N0 before the blockage ({CN0_DBHZ} dB-Hz, of which the front end leaves 43), no gate, \
          noise measured as if it were a signal.\n\
          - *Product baseline*: 20 ms, measurement noise from the measured C/N0, discriminators bounded, gate at 4 deviations; a channel whose signal \
          is gone reports nothing.\n\
