@@ -69,7 +69,7 @@ enum Task {
         /// Which paper.
         #[arg(value_enum)]
         paper: Paper,
-        /// How signals are made [default: if]
+        /// How the signals of jiang2017 are made [default: if]
         #[arg(long, value_enum)]
         level: Option<Level>,
         /// Seeds of each scenario of jiang2017 [default: 8]

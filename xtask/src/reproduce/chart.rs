@@ -18,15 +18,6 @@ pub const GREEN: RGBColor = RGBColor(30, 130, 60);
 /// Orange: a fourth.
 pub const ORANGE: RGBColor = RGBColor(220, 130, 0);
 
-/// How the points of a series are drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Mark {
-    /// Joined by a line.
-    Line,
-    /// Each by itself, so that what is missing shows.
-    Dots,
-}
-
 /// Points of one name and colour.
 #[derive(Debug, Clone)]
 pub struct Series {
@@ -34,8 +25,6 @@ pub struct Series {
     pub label: String,
     /// Colour.
     pub colour: RGBColor,
-    /// How the points are drawn.
-    pub mark: Mark,
     /// Points, in the order in which they are joined.
     pub points: Vec<(f64, f64)>,
 }
@@ -84,15 +73,16 @@ fn draw(title: &str, charts: &[Chart]) -> Drawn<String> {
 fn draw_chart(area: &Area<'_>, chart: &Chart) -> Drawn<()> {
     let points = || chart.series.iter().flat_map(|s| &s.points);
     let (x, y) = (range(points().map(|p| p.0)), range(points().map(|p| p.1)));
-    let margin = 0.06 * (y.1 - y.0);
-    let across = (y.0 - margin)..(y.1 + margin);
+    // The names of the series stand above the lines.
+    let span = y.1 - y.0;
+    let across = (y.0 - 0.06 * span)..(y.1 + 0.35 * span);
     let mut drawing = ChartBuilder::on(area)
         .caption(&chart.caption, ("sans-serif", 15))
         .margin(10)
         .x_label_area_size(36)
         .y_label_area_size(64)
         .build_cartesian_2d(x.0..x.1, across.clone())?;
-    let digits = digits(y.1 - y.0);
+    let digits = digits(span);
     drawing
         .configure_mesh()
         .x_desc(chart.x)
@@ -109,12 +99,7 @@ fn draw_chart(area: &Area<'_>, chart: &Chart) -> Drawn<()> {
     for series in &chart.series {
         let colour = series.colour;
         let points = series.points.iter().copied();
-        let drawn = match series.mark {
-            Mark::Line => drawing.draw_series(LineSeries::new(points, colour.stroke_width(1)))?,
-            Mark::Dots => {
-                drawing.draw_series(points.map(|at| Circle::new(at, 2, colour.filled())))?
-            }
-        };
+        let drawn = drawing.draw_series(LineSeries::new(points, colour.stroke_width(1)))?;
         drawn
             .label(&series.label)
             .legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], colour.stroke_width(3)));
@@ -161,7 +146,6 @@ mod tests {
             series: vec![Series {
                 label: "ours".to_owned(),
                 colour: BLUE,
-                mark: Mark::Line,
                 points: vec![(0.0, 1.0), (1.0, 3.0)],
             }],
             marked: vec![0.5],

@@ -420,6 +420,7 @@ fn code_variance_chips2(cn0_hz: f64, length_s: f64, spacing_chips: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::loop_filter::CarrierBandwidth;
     use super::super::simulated::IdealSignal;
     use super::*;
     use crate::CorrelatorBank;
@@ -492,6 +493,41 @@ mod tests {
             let ratio = doppler / count;
             assert!((0.8..1.5).contains(&ratio), "Doppler {ratio} at {cn0}");
         }
+    }
+
+    #[test]
+    fn frequency_alone_is_tracked_without_carrier_lock() {
+        let frequency_hz = 4.0;
+        let bandwidth = CarrierBandwidth {
+            phase_hz: 0.0,
+            frequency_hz,
+        };
+        let settings = TrackingSettings {
+            locked_bandwidth: bandwidth,
+            ..TrackingSettings::default()
+        }
+        .check()
+        .unwrap();
+        let (mut squares, mut count) = (0.0, 0.0);
+        for seed in 0..8 {
+            let mut signal = IdealSignal::new(45.0, seed);
+            let mut run = Run::new(&signal, 0.12, 21.0);
+            run.channel = Channel::new(&signal.hit(0.12, 21.0), signal.front_end, settings);
+            for k in 1..=100 {
+                let t = 0.1 * f64::from(k);
+                let epoch = run.to(&mut signal, t).unwrap();
+                if k > 20 {
+                    assert_eq!(epoch.lock, Lock::Code, "at {t} s");
+                    let truth = signal.doppler_hz + signal.doppler_rate_hz_s * t;
+                    squares += (epoch.doppler_hz - truth).powi(2) / epoch.doppler_variance_hz2;
+                    count += 1.0;
+                }
+            }
+        }
+        // 640 epochs: 6 %; earlier phases, which the variance leaves out, add a term of the order of loop
+        // bandwidth times integration.
+        let ratio = squares / count;
+        assert!((0.8..1.4).contains(&ratio), "{ratio}");
     }
 
     #[test]

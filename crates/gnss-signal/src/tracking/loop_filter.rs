@@ -79,6 +79,15 @@ impl CarrierLoop {
         }
     }
 
+    /// Change of the oscillator's frequency, Hz, for a phase that advanced by a cycle since the previous
+    /// interval, with the frequency-locked part alone.
+    pub(super) const fn frequency_gain_hz(&self, bandwidth: CarrierBandwidth) -> f64 {
+        match self.order {
+            LoopOrder::Second => bandwidth.frequency_hz / 0.25,
+            LoopOrder::Third => 1.414 * bandwidth.frequency_hz / 0.53,
+        }
+    }
+
     /// Frequency held by the integrator, Hz.
     #[must_use]
     pub const fn frequency_hz(&self) -> f64 {

@@ -504,9 +504,13 @@ impl Steady {
             self.acceleration_hz_s = 0.0;
             let pair = (1.0 + 1.0 / snr) / snr / (std::f64::consts::TAU * interval_s).powi(2);
             if !self.settings.tracks_phase() {
-                // What the loop lets through of it (Kaplan2017, jitter of a frequency-locked loop).
-                let passed = 4.0 * self.settings.locked_bandwidth.frequency_hz * interval_s;
-                return (self.nco.doppler_hz, passed * pair);
+                // Successive frequency errors are differences of phases and cancel but for the last phase,
+                // which the oscillator has by the loop's gain.
+                let gain_hz = self
+                    .carrier
+                    .frequency_gain_hz(self.settings.locked_bandwidth);
+                let variance = gain_hz * gain_hz * costas_variance_cycles2(snr);
+                return (self.nco.doppler_hz, variance);
             }
             return (self.nco.doppler_hz + frequency_error_hz, pair);
         };

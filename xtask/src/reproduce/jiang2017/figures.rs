@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 
 use super::receivers::Variant;
 use super::study::{Case, SETTLING_S, Study};
-use crate::reproduce::chart::{BLUE, Chart, GREEN, Mark, ORANGE, RED, Series, picture};
+use crate::reproduce::chart::{BLUE, Chart, GREEN, ORANGE, RED, Series, picture};
 
 /// The run that is drawn, by number.
 const DRAWN: usize = 0;
@@ -53,7 +53,6 @@ fn axes(
             .map(|(variant, colour)| Series {
                 label: label(*variant, with, without),
                 colour: *colour,
-                mark: Mark::Line,
                 points: points(case, *variant, value),
             })
             .collect(),

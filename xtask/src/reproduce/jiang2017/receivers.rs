@@ -14,8 +14,6 @@ use crate::scenario::built::Scenario;
 
 /// C/N0 of every satellite before the blockage, dB-Hz.
 pub const CN0_DBHZ: f64 = 45.0;
-/// What the channels make of it, dB-Hz: the front end and two bits take 2 dB.
-pub const CHANNEL_DBHZ: f64 = 43.0;
 /// Integration and navigation interval of the paper's receiver, code periods and s.
 const INTERVAL_PERIODS: u32 = 10;
 /// The same, s.
@@ -31,7 +29,7 @@ const CLOCK: ClockNoise = ClockNoise {
 };
 /// Carrier loop of the receiver's own channels, Hz, and their integration, code periods: with 10 Hz the
 /// white frequency noise of this clock alone makes phases scatter by 30 degrees, and the loops slip.
-const CARRIER_HZ: f64 = 30.0;
+pub const CARRIER_HZ: f64 = 30.0;
 const OWN_PERIODS: u32 = 5;
 
 /// One receiver.
@@ -120,15 +118,8 @@ fn paper(excludes: bool) -> VectorSettings {
         process_noise: process_noise(FrequencyPairs::Successive, INTERVAL_S),
         gate: Gate::Off,
         noise: MeasurementNoise::Fixed {
-            pseudorange_m2: tracking_noise::code_variance_m2(
-                CHANNEL_DBHZ,
-                INTERVAL_S,
-                SPACING_CHIPS,
-            ),
-            range_rate_m2_s2: tracking_noise::sum_pair_rate_variance_m2_s2(
-                CHANNEL_DBHZ,
-                INTERVAL_S,
-            ),
+            pseudorange_m2: tracking_noise::code_variance_m2(CN0_DBHZ, INTERVAL_S, SPACING_CHIPS),
+            range_rate_m2_s2: tracking_noise::sum_pair_rate_variance_m2_s2(CN0_DBHZ, INTERVAL_S),
         },
         monitor: excludes.then_some(test),
         ..VectorSettings::default()

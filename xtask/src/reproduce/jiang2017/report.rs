@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use serde_json::{Value, json};
 
 use super::checks::{GOAL_M, alarm_delay_s, largest, median};
-use super::receivers::{CN0_DBHZ, INTERVAL_S, Variant};
+use super::receivers::{CARRIER_HZ, CN0_DBHZ, INTERVAL_S, Variant};
 use super::study::{Case, Run, SETTLING_S, Study};
 use crate::reproduce::Check;
 use crate::reproduce::report::checks_table;
@@ -68,13 +68,17 @@ fn introduction(study: &Study) -> String {
          S_g = 0.04 m^2/s^3. The blocked satellite's signal is gone and the receiver is not told. All receivers of a seed receive the same signal, \
          assisted, with q_a = 1 m^2/s^3.\n\n\
          - *Paper baseline*: updates every {INTERVAL_S} s, early and late 1 chip apart, frequency by equation (6) from successive sums, measurement \
-         noise fixed at what theory gives for {CN0_DBHZ} dB-Hz, no gate, noise measured as if it were a signal.\n\
+         noise fixed at what theory gives for the C/N0 before the blockage ({CN0_DBHZ} dB-Hz, of which the front end leaves 43), no gate, \
+         noise measured as if it were a signal.\n\
          - *Product baseline*: 20 ms, measurement noise from the measured C/N0, discriminators bounded, gate at 4 deviations; a channel whose signal \
          is gone reports nothing.\n\
-         - *Exclusion*: the innovation test (code, 30 updates, 0.01 false alarms a channel and hour) once per update, 100 Hz on the paper's, 50 Hz \
-         on the product's.\n\n\
-         Errors are three-dimensional and counted from {SETTLING_S} s after the first sample; before, a receiver pulls in and starts from least \
-         squares.\n\n"
+         - *Exclusion*: the innovation test once per update, 30 updates, 0.01 false alarms a channel and hour: of code and range rate, 100 Hz, on \
+         the paper's, of the code, 50 Hz, on the product's.\n\n\
+         Two settings differ from the receiver's defaults in all four, because of the scenario's clock. Its white frequency noise is common to all \
+         range rates, and a filter of eight states has no place for it but the drift: S_g is raised by what the mean frequencies change from epoch to \
+         epoch. And until the filter takes over the carrier loops have {CARRIER_HZ} Hz instead of 10 Hz, with which they slip.\n\n\
+         Errors are three-dimensional and counted from {SETTLING_S} s after the filter took over (which starts from least squares), to the end. \
+         An alarm is the monitor's exclusion or the channel's own finding that its signal is gone, whichever comes first.\n\n"
     )
 }
 
@@ -128,7 +132,7 @@ const FIGURES: &str = "\
 ![Scenario 1](scenario1.svg)
 ![Scenario 2](scenario2.svg)
 
-The first seed. The dashed line is the blockage.
+The first seed. The dashed line is the blockage. Both lines of the product lie on each other: nothing is left to exclude.
 
 ";
 
@@ -162,8 +166,8 @@ fn reached(worst_m: f64) -> &'static str {
 const EXPLANATION: &str = "\
 - Why the paper's filter runs off: equation (6) divides by the power of one sum. Of noise that ratio has no variance; single values of tens of metres a \
 second enter with the weight of a good range rate, and the healthy channels are steered away from their signals.
-- The product hardly needs the exclusion: a channel that sees its signal gone says nothing. Its alarm is the channel's own, in most runs before the \
-monitor has any innovation to judge.
+- The product hardly needs the exclusion: a channel that sees its signal gone says nothing. Its alarm is the channel's own, before the monitor has \
+any innovation to judge (column 5).
 
 ";
 
