@@ -145,7 +145,7 @@ fn batch_and_sequential_filter_go_the_same_way() {
         assert!(apart_m < 1e-3, "{apart_m} m at {} s", a.pvt.time_s);
     }
 }
-/// A car-free sky with one fault at 50 s.
+/// A receiver at rest under an open sky, with one fault.
 fn with_fault(fault: &str) -> Judged {
     run(&scenario(
         "static-open-sky",

@@ -1,7 +1,6 @@
 //! Experiments of the papers, repeated: figures, tables, and what of them holds.
 
 pub mod chart;
-pub mod clock;
 pub mod jiang2017;
 mod outcome;
 pub mod report;

@@ -53,6 +53,15 @@ pub(super) struct Navigated {
 }
 
 impl Navigated {
+    /// Neither a solution nor measurements.
+    pub(super) const fn nothing() -> Self {
+        Self {
+            fix: None,
+            receive_time: None,
+            raw: Vec::new(),
+        }
+    }
+
     /// The solution, where it is one of least squares whose measurements agree.
     pub(super) fn consistent(&self) -> Option<&Solution> {
         let (solution, source) = self.fix.as_ref()?;

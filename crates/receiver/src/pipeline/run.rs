@@ -33,6 +33,9 @@ pub fn run<B: CorrelatorBank>(
 ) -> Result<Outcome, ReceiverError> {
     let front_end = bank.front_end();
     let unused = SignalId::gps_l1_ca(NOISE_PRN)?;
+    if let Some(vector) = &settings.vector {
+        vector.check()?;
+    }
     let mut run = Run {
         noise: NoiseFloor::new(unused, front_end)?,
         navigator: Navigator::new(settings, front_end.sample_rate_hz),
@@ -97,7 +100,7 @@ pub(super) struct Run<'a, B> {
 
 impl<B: CorrelatorBank> Run<'_, B> {
     fn until_the_end(&mut self) -> Result<Outcome, ReceiverError> {
-        // Twice as fine as an interval of the filter that is shorter than a step.
+        // A step is never longer than the filter's interval.
         let vector = self.settings.vector.as_ref();
         let step_s = vector.map_or(STEP_S, |v| v.interval_s.min(STEP_S));
         let (mut step, mut epoch) = (1, 1);

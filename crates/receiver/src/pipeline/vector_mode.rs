@@ -2,11 +2,12 @@
 
 use gnss_signal::CorrelatorBank;
 
-use super::navigator::{Navigated, Navigator};
+use super::navigator::{Navigated, Navigator, Tracked};
+use super::report;
 use super::run::{Fixed, Run};
 use super::vector::{self, Outlook, Surroundings, VectorTracking};
 use crate::ReceiverError;
-use crate::record::{EventKind, LoopMembership, Record};
+use crate::record::{ChannelRecord, EventKind, LoopMembership, Record};
 
 /// Successive consistent fixes before the filter takes over: one may agree by chance.
 const FIXES_TO_SWITCH: u32 = 3;
@@ -36,7 +37,11 @@ impl<B: CorrelatorBank> Run<'_, B> {
             return Ok(());
         };
         let model = self.navigator.model();
-        let tracking = VectorTracking::start(&around, solution, &navigated.raw, model, settings)?;
+        let started = VectorTracking::start(&around, solution, &navigated.raw, model, settings);
+        let Some(tracking) = where_numbers_allow(started)? else {
+            self.consistent_fixes = 0;
+            return Ok(());
+        };
         tracking.steer(&around, &mut self.slots);
         self.vector = Some(tracking);
         let to = LoopMembership::Vector;
@@ -48,8 +53,9 @@ impl<B: CorrelatorBank> Run<'_, B> {
         let Some(mut tracking) = self.vector.take() else {
             return Ok(());
         };
+        let since_s = self.time_s(now - tracking.tick);
         // Where the samples end on an epoch they end there once more.
-        if now == tracking.tick {
+        if now == tracking.tick || !(due || tracking.is_due(since_s)) {
             self.vector = Some(tracking);
             return Ok(());
         }
@@ -57,7 +63,11 @@ impl<B: CorrelatorBank> Run<'_, B> {
             return self.leave_vector_tracking(now);
         };
         let model = self.navigator.model();
-        let epoch = tracking.epoch(&around, &model, &mut self.slots)?;
+        let Some(epoch) = where_numbers_allow(tracking.epoch(&around, &model, &mut self.slots))?
+        else {
+            self.vector = Some(tracking);
+            return self.leave_vector_tracking(now);
+        };
         self.navigator.follow(tracking.state());
         self.look_over_sky(now, &tracking)?;
         for (satellite, kind) in epoch.events.clone() {
@@ -98,10 +108,30 @@ impl<B: CorrelatorBank> Run<'_, B> {
             let observations = vector::observations(time_s, time, epoch, &mut self.slots);
             (self.sink)(Record::Observations(observations))?;
         }
-        for member in &epoch.members {
-            (self.sink)(Record::Channel(tracking.channel(time_s, member)))?;
+        let mut records: Vec<ChannelRecord> = epoch
+            .members
+            .iter()
+            .map(|member| tracking.channel(time_s, member))
+            .collect();
+        records.extend(self.unsteered(now));
+        records.sort_by_key(|record| record.satellite);
+        for record in records {
+            (self.sink)(Record::Channel(record))?;
         }
         (self.sink)(Record::Pvt(tracking.pvt(time_s, epoch)))
+    }
+
+    /// Records of the channels that still pull in.
+    fn unsteered(&mut self, now: u64) -> Vec<ChannelRecord> {
+        let time_s = self.time_s(now);
+        let unsteered = self.slots.iter_mut().filter(|s| !s.channel.is_steered());
+        unsteered
+            .filter_map(|slot| {
+                let epoch = slot.channel.epoch(now)?;
+                let tracked = Tracked { slot, epoch };
+                Some(report::channel(time_s, &tracked, &Navigated::nothing()))
+            })
+            .collect()
     }
 
     /// Gives every channel its own loops back.
@@ -127,6 +157,16 @@ impl<B: CorrelatorBank> Run<'_, B> {
             self.emit(now, Some(slot.satellite), EventKind::Dropped)?;
         }
         Ok(())
+    }
+}
+
+/// A result, or none where numbers made it impossible: a singular geometry, a covariance that overflows,
+/// an innovation that is none. Scalar tracking then goes on; other errors end the run.
+fn where_numbers_allow<T>(result: Result<T, ReceiverError>) -> Result<Option<T>, ReceiverError> {
+    match result {
+        Ok(value) => Ok(Some(value)),
+        Err(ReceiverError::Nav(_) | ReceiverError::Monitor(_)) => Ok(None),
+        Err(other) => Err(other),
     }
 }
 

@@ -9,7 +9,6 @@ use gnss_signal::tracking::{FrequencyPairs, Silence, SteeredSettings, TrackingSe
 use receiver::pipeline::{MeasurementNoise, Policy, Settings, VectorSettings};
 
 use crate::judged;
-use crate::reproduce::clock::seen_by_dopplers;
 use crate::scenario::built::Scenario;
 
 /// C/N0 of every satellite before the blockage, dB-Hz.
@@ -115,7 +114,7 @@ fn paper(excludes: bool) -> VectorSettings {
     };
     VectorSettings {
         interval_s: INTERVAL_S,
-        process_noise: process_noise(FrequencyPairs::Successive, INTERVAL_S),
+        process_noise: process_noise(),
         gate: Gate::Off,
         noise: MeasurementNoise::Fixed {
             pseudorange_m2: tracking_noise::code_variance_m2(CN0_DBHZ, INTERVAL_S, SPACING_CHIPS),
@@ -155,14 +154,15 @@ fn own_loops() -> TrackingSettings {
 fn product() -> VectorSettings {
     let settings = VectorSettings::default();
     VectorSettings {
-        process_noise: process_noise(FrequencyPairs::Halves, settings.interval_s),
+        process_noise: process_noise(),
         ..settings
     }
 }
 
-fn process_noise(pairs: FrequencyPairs, interval_s: f64) -> ProcessNoise {
+/// How all of them are told that receiver and clock move.
+const fn process_noise() -> ProcessNoise {
     ProcessNoise {
         acceleration: AccelerationNoise::isotropic(ACCELERATION_M2_PER_S3),
-        clock: seen_by_dopplers(CLOCK, pairs, interval_s, interval_s),
+        clock: CLOCK,
     }
 }

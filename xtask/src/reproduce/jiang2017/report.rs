@@ -74,9 +74,9 @@ fn introduction(study: &Study) -> String {
          is gone reports nothing.\n\
          - *Exclusion*: the innovation test once per update, 30 updates, 0.01 false alarms a channel and hour: of code and range rate, 100 Hz, on \
          the paper's, of the code, 50 Hz, on the product's.\n\n\
-         Two settings differ from the receiver's defaults in all four, because of the scenario's clock. Its white frequency noise is common to all \
-         range rates, and a filter of eight states has no place for it but the drift: S_g is raised by what the mean frequencies change from epoch to \
-         epoch. And until the filter takes over the carrier loops have {CARRIER_HZ} Hz instead of 10 Hz, with which they slip.\n\n\
+         One setting differs from the receiver's defaults in all four, because of the scenario's clock: until the filter takes over the carrier loops \
+         have {CARRIER_HZ} Hz instead of 10 Hz, with which they slip on its white frequency noise. That noise is common to all range rates; before \
+         each update the filter takes its drift for less certain by S_f over the interval.\n\n\
          Errors are three-dimensional and counted from {SETTLING_S} s after the filter took over (which starts from least squares), to the end. \
          An alarm is the monitor's exclusion or the channel's own finding that its signal is gone, whichever comes first.\n\n"
     )

@@ -157,6 +157,11 @@ impl VectorTracking {
         self.filter.state()
     }
 
+    /// Whether the next update is due `since_s` after the last.
+    pub(super) fn is_due(&self, since_s: f64) -> bool {
+        self.settings.is_due(since_s)
+    }
+
     /// Takes in what the channels measured up to an epoch, and steers them on.
     ///
     /// # Errors
@@ -305,7 +310,8 @@ impl VectorTracking {
             Advice::Reset(channels) => {
                 self.reset(measurements, channels.len(), epoch)?;
             }
-            Advice::Nothing | Advice::Isolate(_) => {}
+            Advice::Isolate(channels) => self.isolate(&channels, epoch),
+            Advice::Nothing => {}
         }
         let covariance = self.filter.covariance();
         let position: f64 = [0, 2, 4].iter().map(|i| covariance[(*i, *i)]).sum();
@@ -386,6 +392,18 @@ impl VectorTracking {
         {
             self.geometry = Some(geometry);
             self.fixed = self.state().time;
+        }
+    }
+
+    /// Suspends channels of which the gate keeps refusing measurements (Li2019), where they are watched.
+    fn isolate(&mut self, channels: &[SatelliteId], epoch: &mut Epoch) {
+        let policy = self.settings.policy;
+        for satellite in channels {
+            let skipped = f64::from(self.faults.skipped_epochs(*satellite));
+            let Some(change) = self.watch(*satellite).isolate(skipped) else {
+                continue;
+            };
+            report::change(*satellite, &change, policy, &mut epoch.events);
         }
     }
 

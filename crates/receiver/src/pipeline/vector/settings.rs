@@ -1,8 +1,13 @@
 //! Settings of vector tracking.
 
-use fault_ml::InnovationTestSettings;
+use fault_ml::{InnovationTest, InnovationTestSettings};
 use gnss_nav::dynamics::ProcessNoise;
 use gnss_nav::filter::Gate;
+
+use crate::ReceiverError;
+
+/// Longest time between two updates, s: the steering of a car does not hold longer.
+const LONGEST_INTERVAL_S: f64 = 1.0;
 
 /// Which filter, by how it takes in an epoch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -62,6 +67,29 @@ pub struct VectorSettings {
     pub policy: Policy,
 }
 
+impl VectorSettings {
+    /// Whether all of it is possible.
+    ///
+    /// # Errors
+    /// Naming the first value that is not.
+    pub fn check(&self) -> Result<(), ReceiverError> {
+        self.process_noise.check()?;
+        self.monitor.map(InnovationTest::new).transpose()?;
+        if !(self.interval_s > 0.0 && self.interval_s <= LONGEST_INTERVAL_S) {
+            let given = self.interval_s;
+            return Err(ReceiverError::Option {
+                what: format!("the filter's interval is {given} s: expected above 0 and at most 1"),
+            });
+        }
+        Ok(())
+    }
+
+    /// Whether an update is due `since_s` after the last, give or take the rounding of ticks.
+    pub(super) fn is_due(&self, since_s: f64) -> bool {
+        since_s > self.interval_s * (1.0 - 1e-3)
+    }
+}
+
 impl Default for VectorSettings {
     fn default() -> Self {
         let interval_s = 0.02;
@@ -77,5 +105,40 @@ impl Default for VectorSettings {
             }),
             policy: Policy::Exclude,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn updates_are_an_interval_apart() {
+        let settings = VectorSettings {
+            interval_s: 0.1,
+            ..VectorSettings::default()
+        };
+        assert!(!settings.is_due(0.08));
+        // A sample early.
+        assert!(settings.is_due(0.1 - 1.0 / 2.6e6));
+    }
+
+    #[test]
+    fn impossible_settings_are_named() {
+        assert!(VectorSettings::default().check().is_ok());
+        let settings = VectorSettings {
+            interval_s: f64::NAN,
+            ..VectorSettings::default()
+        };
+        let text = settings.check().unwrap_err().to_string();
+        assert!(text.starts_with("the filter's interval is NaN s"), "{text}");
+        let settings = VectorSettings {
+            monitor: Some(InnovationTestSettings {
+                window: 1,
+                ..InnovationTestSettings::default()
+            }),
+            ..VectorSettings::default()
+        };
+        assert!(settings.check().is_err());
     }
 }

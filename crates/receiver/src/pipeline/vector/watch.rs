@@ -1,7 +1,7 @@
 //! Whether a satellite is believed: its monitor, and what followed from it.
 
 use fault_ml::{ChannelMonitor, ChannelVerdict, Innovation, InnovationTest, Judgement};
-use gnss_nav::filter::{Disposition, SatelliteInnovation};
+use gnss_nav::filter::{Disposition, FaultThresholds, SatelliteInnovation};
 
 use super::settings::Policy;
 use crate::ReceiverError;
@@ -103,6 +103,22 @@ impl Watch {
                 clean.then_some(Change::Cleared)
             }
         }
+    }
+
+    /// The gate refused measurements of `skipped` of the last epochs; returns what changed by it.
+    /// Without a monitor nothing could clear the satellite again, and nothing is done.
+    pub(super) fn isolate(&mut self, skipped: f64) -> Option<Change> {
+        if self.suspended.is_some() || self.monitor.is_none() {
+            return None;
+        }
+        // So many epochs and more: the threshold itself is exceeded.
+        let threshold = f64::from(FaultThresholds::default().epochs_to_isolate) - 1.0;
+        let judgement = Judgement::new(skipped, threshold).ok()?;
+        self.suspended = Some(Suspended::default());
+        Some(Change::Alarm {
+            monitor: "gate",
+            judgement,
+        })
     }
 
     /// What the filter is to do with the satellite.
