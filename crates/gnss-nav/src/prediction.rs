@@ -82,22 +82,33 @@ pub fn predict_through(
     receiver: &ReceiverState,
     model: &MeasurementModel,
 ) -> Result<Expected, NavError> {
-    let (state, line_of_sight) =
-        received_state(ephemeris, &receiver.position_ecef_m, receiver.time)?;
-    let predicted = model.predict(&state, &receiver.position_ecef_m, receiver.time);
+    let (state, _) = received_state(ephemeris, &receiver.position_ecef_m, receiver.time)?;
+    Ok(predict_from(&state, receiver, model))
+}
+
+/// The same of a satellite whose state at transmission is known, as from a prediction for nearly the same
+/// receiver: a travel time wrong by 10 m moves a satellite by 0.1 mm.
+#[must_use]
+pub fn predict_from(
+    state: &SatelliteState,
+    receiver: &ReceiverState,
+    model: &MeasurementModel,
+) -> Expected {
+    let predicted = model.predict(state, &receiver.position_ecef_m, receiver.time);
+    let line_of_sight = predicted.line_of_sight;
     let range_rate_mps = line_of_sight.range_rate_mps(&receiver.velocity_ecef_mps)
         + receiver.clock_drift_mps
         - SPEED_OF_LIGHT_MPS * state.clock_drift;
     let travel_m = line_of_sight.range_m + predicted.delay_m;
-    Ok(Expected {
+    Expected {
         range_m: line_of_sight.range_m,
         range_rate_mps,
         doppler_hz: -range_rate_mps / L1_WAVELENGTH_M,
         delay_m: predicted.delay_m,
         transmit_time: receiver.time - travel_m / SPEED_OF_LIGHT_MPS + state.clock_bias_s,
         look: predicted.look,
-        state,
-    })
+        state: *state,
+    }
 }
 
 /// State at transmission of what `receiver_ecef_m` receives at GPS time `time`.
@@ -174,6 +185,26 @@ mod tests {
             assert!((code_hz - n.code_rate_hz()).abs() < allowed_hz);
             let doppler_hz = (per_second - 1.0) * crate::constants::L1_HZ;
             assert!((doppler_hz - n.doppler_hz).abs() < allowed_mps / L1_WAVELENGTH_M);
+        }
+    }
+
+    #[test]
+    fn a_satellite_known_from_nearby_is_as_good() {
+        let model = through_air();
+        let state = receiver();
+        for ephemeris in constellation(&mut ChaCha8Rng::seed_from_u64(1)).iter() {
+            let clock = state.receiver_clock();
+            let Ok(there) = state.expect(ephemeris, clock, &model) else {
+                continue;
+            };
+            let mut moved = state;
+            moved.position_ecef_m += Vector3::new(6.0, -6.0, 5.0);
+            let exact = moved.expect(ephemeris, clock, &model).unwrap();
+            let near = predict_from(&there.state, &ReceiverState::from(&moved), &model);
+            let apart_m = (near.transmit_time - exact.transmit_time) * SPEED_OF_LIGHT_MPS;
+            // 10 m over c times 4 km/s.
+            assert!(apart_m.abs() < 1.4e-4, "{apart_m} m");
+            assert!((near.range_rate_mps - exact.range_rate_mps).abs() < 1e-6);
         }
     }
 

@@ -3,8 +3,8 @@
 use nalgebra::Vector3;
 
 use crate::constants::SPEED_OF_LIGHT_MPS;
-use crate::prediction::{Expected, ReceiverState, predict_through};
-use crate::{Ephemeris, GpsTime, MeasurementModel, NavError, Solution};
+use crate::prediction::{Expected, ReceiverState, predict_from, predict_through};
+use crate::{Ephemeris, GpsTime, MeasurementModel, NavError, SatelliteState, Solution};
 
 /// Position, velocity, clock bias and clock drift of a receiver.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -62,6 +62,18 @@ impl NavState {
     ) -> Result<Expected, NavError> {
         let there = self.at(self.gps_time(receiver_clock));
         predict_through(ephemeris, &ReceiverState::from(&there), model)
+    }
+
+    /// The same of a satellite whose state at transmission is known; see [`predict_from`].
+    #[must_use]
+    pub fn expect_from(
+        &self,
+        satellite: &SatelliteState,
+        receiver_clock: GpsTime,
+        model: &MeasurementModel,
+    ) -> Expected {
+        let there = self.at(self.gps_time(receiver_clock));
+        predict_from(satellite, &ReceiverState::from(&there), model)
     }
 
     pub(crate) fn is_finite(&self) -> bool {

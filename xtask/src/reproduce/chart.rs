@@ -44,8 +44,16 @@ pub struct Chart {
     pub marked: Vec<f64>,
 }
 
-type Drawn<T> = std::result::Result<T, Box<dyn std::error::Error>>;
-type Area<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
+/// What drawing returns.
+pub(super) type Drawn<T> = std::result::Result<T, Box<dyn std::error::Error>>;
+/// A part of a picture.
+pub(super) type Area<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
+/// A chart of numbers over numbers.
+pub(super) type Drawing<'a, 'b> = ChartContext<
+    'a,
+    SVGBackend<'b>,
+    Cartesian2d<plotters::coord::types::RangedCoordf64, plotters::coord::types::RangedCoordf64>,
+>;
 
 /// An SVG of `charts` under one title.
 ///
@@ -104,6 +112,11 @@ fn draw_chart(area: &Area<'_>, chart: &Chart) -> Drawn<()> {
             .label(&series.label)
             .legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], colour.stroke_width(3)));
     }
+    legend(&mut drawing)
+}
+
+/// The names of the series in the upper left corner.
+pub(super) fn legend<'a, 'b: 'a>(drawing: &mut Drawing<'a, 'b>) -> Drawn<()> {
     drawing
         .configure_series_labels()
         .position(SeriesLabelPosition::UpperLeft)

@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use fault_ml::InnovationTest;
 use gnss_nav::SatelliteId;
 use gnss_signal::tracking::{NoiseFloor, Spectrum, TrackingSettings};
 use gnss_signal::{CorrelatorBank, FrontEnd, Replica, SignalId, Taps};
@@ -13,7 +14,7 @@ use super::schedule::Schedule;
 use super::settings::Settings;
 use super::slot::Slot;
 use super::spectrum::SpectrumSense;
-use super::vector::VectorTracking;
+use super::vector::{VectorSettings, VectorTracking};
 use crate::ReceiverError;
 use crate::record::{Event, EventKind, Record};
 
@@ -33,9 +34,7 @@ pub fn run<B: CorrelatorBank>(
 ) -> Result<Outcome, ReceiverError> {
     let front_end = bank.front_end();
     let unused = SignalId::gps_l1_ca(NOISE_PRN)?;
-    if let Some(vector) = &settings.vector {
-        vector.check()?;
-    }
+    let monitor = settings.vector.as_ref().map(VectorSettings::monitor);
     let mut run = Run {
         noise: NoiseFloor::new(unused, front_end)?,
         navigator: Navigator::new(settings, front_end.sample_rate_hz),
@@ -54,6 +53,7 @@ pub fn run<B: CorrelatorBank>(
         fixed: Fixed::Never,
         channel_steps: 0,
         steps: 0,
+        monitor: monitor.transpose()?.flatten(),
         vector: None,
         consistent_fixes: 0,
         next_look_s: 0.0,
@@ -89,6 +89,8 @@ pub(super) struct Run<'a, B> {
     pub(super) fixed: Fixed,
     pub(super) channel_steps: usize,
     pub(super) steps: usize,
+    /// The innovation test of a channel, empty: its threshold takes long to find.
+    pub(super) monitor: Option<InnovationTest>,
     pub(super) vector: Option<VectorTracking>,
     /// Successive fixes whose measurements agree.
     pub(super) consistent_fixes: u32,

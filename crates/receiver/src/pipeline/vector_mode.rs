@@ -37,12 +37,13 @@ impl<B: CorrelatorBank> Run<'_, B> {
             return Ok(());
         };
         let model = self.navigator.model();
-        let started = VectorTracking::start(&around, solution, &navigated.raw, model, settings);
+        let (raw, monitor) = (&navigated.raw, self.monitor.clone());
+        let started = VectorTracking::start(&around, solution, raw, model, settings, monitor);
         let Some(tracking) = where_numbers_allow(started)? else {
             self.consistent_fixes = 0;
             return Ok(());
         };
-        tracking.steer(&around, &mut self.slots);
+        tracking.steer(&around, &[], &mut self.slots);
         self.vector = Some(tracking);
         let to = LoopMembership::Vector;
         self.emit(now, None, EventKind::ModeSwitched { to })

@@ -6,6 +6,7 @@ use plotters::prelude::*;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
+use super::super::chart::{Area, Drawing, Drawn, legend};
 use super::setting::{
     EPOCHS, Geometry, ONSET, SATELLITES, STEPPED, STEPS_M, Truth, residuals, sights,
 };
@@ -81,8 +82,6 @@ impl Shown<'_> {
     }
 }
 
-type Drawn<T> = std::result::Result<T, Box<dyn std::error::Error>>;
-
 fn draw(number: usize, step_m: f64, swarm: &Trace, bootstrap: &Trace) -> Drawn<String> {
     let mut svg = String::new();
     {
@@ -110,15 +109,8 @@ fn decision(ratios: &[f64; SATELLITES]) -> f64 {
     ratios.iter().copied().fold(f64::NEG_INFINITY, f64::max)
 }
 
-type Area<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
-type Chart<'a, 'b> = ChartContext<
-    'a,
-    SVGBackend<'b>,
-    Cartesian2d<plotters::coord::types::RangedCoordf64, plotters::coord::types::RangedCoordf64>,
->;
-
 /// A chart of seconds against a ratio up to `top`, with the threshold drawn.
-fn chart<'a, 'b>(area: &Area<'b>, caption: &str, what: &str, top: f64) -> Drawn<Chart<'a, 'b>> {
+fn chart<'a, 'b>(area: &Area<'b>, caption: &str, what: &str, top: f64) -> Drawn<Drawing<'a, 'b>> {
     let mut chart = ChartBuilder::on(area)
         .caption(caption, ("sans-serif", 15))
         .margin(10)
@@ -140,17 +132,6 @@ fn chart<'a, 'b>(area: &Area<'b>, caption: &str, what: &str, top: f64) -> Drawn<
         .label(format!("threshold {THRESHOLD}"))
         .legend(|(x, y)| PathElement::new([(x, y), (x + 18, y)], BLACK));
     Ok(chart)
-}
-
-fn legend<'a, 'b: 'a>(chart: &mut Chart<'a, 'b>) -> Drawn<()> {
-    chart
-        .configure_series_labels()
-        .position(SeriesLabelPosition::UpperLeft)
-        .background_style(WHITE.mix(0.85))
-        .border_style(BLACK.mix(0.2))
-        .label_font(("sans-serif", 13))
-        .draw()?;
-    Ok(())
 }
 
 fn draw_ratios(area: &Area, swarm: &Trace) -> Drawn<()> {

@@ -132,8 +132,8 @@ impl VectorTracking {
         raw: &[RawMeasurement],
         model: MeasurementModel,
         settings: &VectorSettings,
+        monitor: Option<InnovationTest>,
     ) -> Result<Self, ReceiverError> {
-        let monitor = settings.monitor.map(InnovationTest::new).transpose()?;
         let measurements = form(around.receive_time, raw, around.store).measurements;
         Ok(Self {
             filter: from_solution(solution, &measurements, &model, settings)?,
@@ -150,6 +150,10 @@ impl VectorTracking {
             outlook: Outlook::Goes,
             settings: settings.clone(),
         })
+    }
+
+    const fn model(&self) -> &MeasurementModel {
+        &self.model
     }
 
     /// The present estimate.
@@ -194,7 +198,7 @@ impl VectorTracking {
             self.outlook = Outlook::Contradicted;
         }
         self.remember_velocity();
-        self.steer(around, slots);
+        self.steer(around, &epoch.members, slots);
         Ok(epoch)
     }
 

@@ -68,20 +68,19 @@ pub struct VectorSettings {
 }
 
 impl VectorSettings {
-    /// Whether all of it is possible.
+    /// The innovation test of a channel, where there is one, if all settings are possible.
     ///
     /// # Errors
     /// Naming the first value that is not.
-    pub fn check(&self) -> Result<(), ReceiverError> {
+    pub(in crate::pipeline) fn monitor(&self) -> Result<Option<InnovationTest>, ReceiverError> {
         self.process_noise.check()?;
-        self.monitor.map(InnovationTest::new).transpose()?;
         if !(self.interval_s > 0.0 && self.interval_s <= LONGEST_INTERVAL_S) {
             let given = self.interval_s;
             return Err(ReceiverError::Option {
                 what: format!("the filter's interval is {given} s: expected above 0 and at most 1"),
             });
         }
-        Ok(())
+        Ok(self.monitor.map(InnovationTest::new).transpose()?)
     }
 
     /// Whether an update is due `since_s` after the last, give or take the rounding of ticks.
@@ -125,12 +124,12 @@ mod tests {
 
     #[test]
     fn impossible_settings_are_named() {
-        assert!(VectorSettings::default().check().is_ok());
+        assert!(VectorSettings::default().monitor().is_ok());
         let settings = VectorSettings {
             interval_s: f64::NAN,
             ..VectorSettings::default()
         };
-        let text = settings.check().unwrap_err().to_string();
+        let text = settings.monitor().unwrap_err().to_string();
         assert!(text.starts_with("the filter's interval is NaN s"), "{text}");
         let settings = VectorSettings {
             monitor: Some(InnovationTestSettings {
@@ -139,6 +138,6 @@ mod tests {
             }),
             ..VectorSettings::default()
         };
-        assert!(settings.check().is_err());
+        assert!(settings.monitor().is_err());
     }
 }

@@ -6,14 +6,29 @@ use gnss_nav::{GpsTime, RawMeasurement, SatelliteId};
 use gnss_signal::tracking::{ChannelEpoch, Steering};
 
 use super::settings::{MeasurementNoise, VectorSettings};
-use super::{Surroundings, VectorTracking};
+use super::{Member, Surroundings, VectorTracking};
 use crate::pipeline::slot::Slot;
 
 impl VectorTracking {
-    /// Puts every channel whose bit boundaries are known where its signal is expected.
-    pub(in crate::pipeline) fn steer(&self, around: &Surroundings, slots: &mut [Slot]) {
+    /// Puts every channel whose bit boundaries are known where its signal is expected; of `members` it is
+    /// known where their satellites are.
+    pub(in crate::pipeline) fn steer(
+        &self,
+        around: &Surroundings,
+        members: &[Member],
+        slots: &mut [Slot],
+    ) {
         for slot in slots {
-            if let Some(expected) = self.expected(around, slot.satellite) {
+            let member = members.iter().find(|m| m.satellite == slot.satellite);
+            let expected = match member {
+                Some(member) => Some(self.state().expect_from(
+                    &member.expected.state,
+                    around.receive_time,
+                    self.model(),
+                )),
+                None => self.expected(around, slot.satellite),
+            };
+            if let Some(expected) = expected {
                 slot.channel.steer(&steering(around.tick, &expected));
             }
         }
