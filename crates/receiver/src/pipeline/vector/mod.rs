@@ -4,6 +4,7 @@
 //! state of the filter, one epoch later.
 
 mod clock_step;
+mod filter;
 mod report;
 mod settings;
 mod steering;
@@ -13,9 +14,8 @@ use std::collections::{BTreeMap, VecDeque};
 
 use fault_ml::InnovationTest;
 use gnss_nav::filter::{
-    Advice, BatchFilter, Covariance, Disposition, EpochGeometry, FaultLogic, FaultThresholds,
-    FilterSettings, Innovations, NavFilter, Observable, SatelliteInnovation, SequentialFilter,
-    SkipReason, Update,
+    Advice, Disposition, EpochGeometry, FaultLogic, FaultThresholds, Innovations, NavFilter,
+    Observable, SatelliteInnovation, SkipReason, Update,
 };
 use gnss_nav::measurement::form;
 use gnss_nav::prediction::Expected;
@@ -32,6 +32,7 @@ use crate::ReceiverError;
 use crate::record::EventKind;
 
 use clock_step::ClockStep;
+use filter::{filter, from_solution};
 pub(super) use report::observations;
 pub use settings::{FilterKind, MeasurementNoise, Policy, VectorSettings};
 pub(super) use steering::steering;
@@ -46,9 +47,6 @@ const READMIT_S: f64 = 2.0;
 /// Time over which the receiver's acceleration is a mean, s: long enough that noise of velocities does
 /// not matter over the age of a measurement.
 const ACCELERATION_SPAN_S: f64 = 0.2;
-/// Deviation of each coordinate at the start beyond the noise of the code loops, m: an unsteady
-/// oscillator or acceleration drags them along.
-const START_SIGMA_M: f64 = 1.5;
 /// A message tells another time than the filter's when they are this far apart, s: half a code period.
 const TIME_DISAGREES_S: f64 = 0.5e-3;
 /// So many messages are believed rather than the filter: one may be damaged.
@@ -461,48 +459,4 @@ impl VectorTracking {
         }
         Ok(())
     }
-}
-
-/// A filter that knows `state` with `covariance`.
-fn filter(
-    state: NavState,
-    covariance: Covariance,
-    model: &MeasurementModel,
-    settings: &VectorSettings,
-) -> Result<Box<dyn NavFilter>, ReceiverError> {
-    let filter_settings = FilterSettings {
-        process_noise: settings.process_noise,
-        model: *model,
-        gate: settings.gate,
-    };
-    Ok(match settings.filter {
-        FilterKind::Batch => Box::new(BatchFilter::new(state, covariance, filter_settings)?),
-        FilterKind::Sequential => {
-            Box::new(SequentialFilter::new(state, covariance, filter_settings)?)
-        }
-    })
-}
-
-/// A filter that starts where least squares of `measurements` ended.
-///
-/// What lasts of their errors is not for the filter to average away: it starts with what tracking noise
-/// made of the solution, and room for what the loops erred beyond their noise.
-fn from_solution(
-    solution: &Solution,
-    measurements: &[Measurement],
-    model: &MeasurementModel,
-    settings: &VectorSettings,
-) -> Result<Box<dyn NavFilter>, ReceiverError> {
-    let filter_settings = FilterSettings {
-        model: *model,
-        ..FilterSettings::default()
-    };
-    let start = SequentialFilter::from_solution(solution, filter_settings)?;
-    let used = |satellite| solution.satellites.iter().any(|s| s.satellite == satellite);
-    let geometry = start.innovations(measurements)?.geometry(used)?;
-    let mut own = geometry.with_noise_alone(&start.covariance());
-    for offset in [0, 2, 4, 6] {
-        own[(offset, offset)] += START_SIGMA_M * START_SIGMA_M;
-    }
-    filter(*start.state(), own, model, settings)
 }
