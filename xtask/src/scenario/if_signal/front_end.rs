@@ -38,6 +38,9 @@ pub(super) struct Bench {
     on_ticks: Planes,
     between: Planes,
     baseband: Planes,
+    /// What leaves the front end, and its components as they are delivered.
+    pub(super) received: Planes,
+    pub(super) components: Vec<f32>,
 }
 
 impl FrontEnd {
@@ -88,6 +91,8 @@ impl FrontEnd {
             on_ticks: Planes::default(),
             between: Planes::default(),
             baseband: Planes::default(),
+            received: Planes::default(),
+            components: Vec::new(),
         }
     }
 
@@ -121,9 +126,8 @@ impl FrontEnd {
     ) {
         let first = floor_to_group(tick);
         let before = (tick - first) as usize;
-        out.clear((before + samples).next_multiple_of(GROUP));
-        let segments = segments.iter().map(AsRef::as_ref);
-        bench.modulator.add_all(segments, HALVES * first, out);
+        out.fit((before + samples).next_multiple_of(GROUP));
+        bench.modulator.make(segments, HALVES * first, out);
         self.add_carriers(first, Stagger::Whole, out);
         self.add_noise(first, out);
         for plane in out.each() {
@@ -151,11 +155,11 @@ impl FrontEnd {
             on_ticks,
             between,
             baseband,
+            ..
         } = bench;
         let made = length + 2 * HALF_BAND_REACH;
-        halves.clear(2 * made);
-        let segments = segments.iter().map(AsRef::as_ref);
-        modulator.add_all(segments, HALVES * (first - reach), halves);
+        halves.fit(2 * made);
+        modulator.make(segments, HALVES * (first - reach), halves);
         halves.deal(made, on_ticks, between);
         for (stagger, planes) in [
             (Stagger::Whole, &mut *on_ticks),

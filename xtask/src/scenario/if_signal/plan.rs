@@ -10,9 +10,9 @@ use super::grid::{Grid, HALVES};
 use super::segment::{Segment, Track};
 use crate::scenario::antenna::{Emitter, Gap};
 
-/// Samples delivered by a block, at most: 2 ms, and no more than this. A multiple of 8, so that
+/// Samples delivered by a block, at most: 4 ms, and no more than this. A multiple of 8, so that
 /// blocks of any format end with a byte.
-const LONGEST_BLOCK_S: f64 = 2e-3;
+const LONGEST_BLOCK_S: f64 = 4e-3;
 const LARGEST_BLOCK: i64 = 16_384;
 
 /// Consecutive ticks of a block.

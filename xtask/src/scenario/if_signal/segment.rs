@@ -11,8 +11,8 @@ use super::chips::ChipTable;
 use super::grid::{Grid, HALVES};
 use crate::scenario::antenna::{Emitter, Ray};
 
-/// Length of a segment, s: an acceleration of 100 m/s^2 bends a ray by 12 um (6e-5 cycles) in it.
-const SEGMENT_S: f64 = 1e-3;
+/// Length of a segment, s: an acceleration of 100 m/s^2 bends a ray by 50 um (3e-4 cycles) in it.
+const SEGMENT_S: f64 = 2e-3;
 /// Chips a segment may span: code rates far from the nominal one are a fault of the scene.
 const MOST_CHIPS: f64 = 4096.0;
 /// Chips in the table before the first and after the last: neighbours of an edge, and what a
@@ -174,7 +174,7 @@ fn uniform(emitter: &mut dyn Emitter, begin: &Ray, end: &Ray, halves: f64) -> Re
     let amplitude = 0.5 * (begin.amplitude + end.amplitude);
     ensure!(
         chips > 0.0 && chips < MOST_CHIPS && cycles.is_finite() && amplitude.is_finite(),
-        "{} advances by {chips} chips and {cycles} cycles at amplitude {amplitude} in a millisecond",
+        "{} advances by {chips} chips and {cycles} cycles at amplitude {amplitude} in {SEGMENT_S} s",
         emitter.signal()
     );
     let since_second = from.code_time.fraction_s() * spec.code_rate_hz;

@@ -159,23 +159,24 @@ impl Receiving {
     /// Makes a block.
     pub(super) fn make(&self, runs: Vec<Run>, bench: &mut Bench) -> Made {
         let mut gain = self.gain.clone();
-        let mut components = Vec::new();
         let mut waiting = Vec::new();
+        bench.components.clear();
         for run in runs {
-            let mut planes = Planes::default();
+            let mut planes = std::mem::take(&mut bench.received);
             self.front_end
                 .receive(&run.segments, run.tick, run.samples, bench, &mut planes);
             if gain.follows() {
                 waiting.push((run, planes));
             } else {
-                self.finish(&mut gain, &run, &mut planes, &mut components);
+                self.finish(&mut gain, &run, &mut planes, &mut bench.components);
+                bench.received = planes;
             }
         }
         if gain.follows() {
             return Made::Samples(waiting);
         }
         let mut bytes = Vec::new();
-        self.quantiser.append(&components, &mut bytes);
+        self.quantiser.append(&bench.components, &mut bytes);
         Made::Bytes(bytes)
     }
 
