@@ -11,7 +11,7 @@ use gnss_nav::GpsTime;
 use gnss_nav::lnav::LnavEncoder;
 use gnss_signal::sample::{SampleDescription, SampleFormat};
 use gnss_signal::{CorrelatorBank, Replica, SignalId, TapOffsets, Taps};
-use receiver::pipeline::{Aiding, Settings, run};
+use receiver::pipeline::{Aiding, Settings, VectorSettings, run};
 use receiver::record::Record;
 use xtask::scenario::antenna::{Emitter, Gain, Reception, Scene};
 use xtask::scenario::built::Scenario;
@@ -136,7 +136,11 @@ fn whole_receiver(criterion: &mut Criterion<CpuTime>) -> Result<()> {
     let file = catalogue::find("static-open-sky")?;
     let mut group = criterion.benchmark_group("receiver");
     group.sample_size(10);
-    for duration_s in [2.0, 22.0] {
+    for (mode, vector, duration_s) in [
+        ("scalar", None, 2.0),
+        ("scalar", None, 22.0),
+        ("vector", Some(VectorSettings::default()), 22.0),
+    ] {
         let scenario = Scenario::new(&file.with(&[format!("duration_s={duration_s:?}")])?, None)?;
         let settings = Settings {
             aiding: Aiding {
@@ -145,10 +149,11 @@ fn whole_receiver(criterion: &mut Criterion<CpuTime>) -> Result<()> {
                 position_ecef_m: Some(scenario.truth.trajectory.at(0.0).position_ecef_m),
                 time: Some(scenario.truth.start),
             },
+            vector,
             ..Settings::default()
         };
         let mut failed = None;
-        group.bench_function(format!("{duration_s} s"), |bencher| {
+        group.bench_function(format!("{mode}, {duration_s} s"), |bencher| {
             bencher.iter(|| {
                 let done = solutions(&scenario, &settings);
                 failed = failed.take().or(black_box(done).err());

@@ -40,7 +40,8 @@ impl MovingSum {
             .map(|k| {
                 let (sin, cos) = ((k as f64 + 0.5) * step).sin_cos();
                 let (shared, rest) = (level * cos * cos, level * sin * sin);
-                let jump = self.epoch.sf(rest) * self.epoch.cdf(rest);
+                let enters = self.epoch.sf(rest);
+                let jump = enters * (1.0 - enters);
                 self.shared.pdf(shared) * jump * 2.0 * level * sin * cos * step
             })
             .sum()
@@ -49,21 +50,38 @@ impl MovingSum {
     /// Level above the mean that is crossed with `probability` per epoch; `None` where even the
     /// mean is crossed less often, or none is that rare.
     pub(crate) fn level(&self, probability: f64) -> Option<f64> {
-        let (mut low, mut high) = (self.mean, 2.0 * self.mean + 100.0);
-        let is_rarer = |level| self.crossing_probability(level) < probability;
-        if is_rarer(low) || !is_rarer(high) {
+        // Above zero where crossings are more frequent; nearly straight far out.
+        let excess = |level| (self.crossing_probability(level) / probability).ln();
+        let at = |level| (level, excess(level));
+        let (mut low, mut high) = (at(self.mean), at(2.0 * self.mean + 100.0));
+        if !(low.1 >= 0.0 && high.1 < 0.0) {
             return None;
         }
-        // Halved to the last digits of a float.
-        for _ in 0..60 {
-            let middle = 0.5 * (low + high);
-            if is_rarer(middle) {
-                high = middle;
+        // False position; an end that stays twice counts half (the Illinois rule).
+        let mut kept_low = None;
+        while high.0 - low.0 > 1e-12 * high.0 {
+            let straight = low.0 + (high.0 - low.0) * low.1 / (low.1 - high.1);
+            let inside = straight.is_finite() && low.0 < straight && straight < high.0;
+            let next = at(if inside {
+                straight
             } else {
-                low = middle;
+                0.5 * (low.0 + high.0)
+            });
+            if next.1.abs() < 1e-9 {
+                return Some(next.0);
             }
+            let keeps_low = next.1 < 0.0;
+            let again = kept_low == Some(keeps_low);
+            if keeps_low {
+                high = next;
+                low.1 *= if again { 0.5 } else { 1.0 };
+            } else {
+                low = next;
+                high.1 *= if again { 0.5 } else { 1.0 };
+            }
+            kept_low = Some(keeps_low);
         }
-        Some(high)
+        Some(high.0)
     }
 }
 

@@ -26,21 +26,17 @@ impl LineOfSight {
     /// the angle of the travel time, which replaces the first-order Sagnac correction.
     #[must_use]
     pub fn new(satellite: &SatelliteState, receiver_ecef_m: &Vector3<f64>) -> Self {
-        let mut range_m = (satellite.position_ecef_m - receiver_ecef_m).norm();
-        let mut position = satellite.position_ecef_m;
         // Each pass shrinks the error (140 m at first) by the speed of the frame over c, 1e-6.
-        for _ in 0..3 {
-            position = into_reception_frame(&satellite.position_ecef_m, range_m);
-            range_m = (position - receiver_ecef_m).norm();
-        }
+        let nearly_m = (satellite.position_ecef_m - receiver_ecef_m).norm();
+        let nearly = FrameTurn::during(nearly_m).of(&satellite.position_ecef_m);
+        let turn = FrameTurn::during((nearly - receiver_ecef_m).norm());
+        let position = turn.of(&satellite.position_ecef_m);
+        let range_m = (position - receiver_ecef_m).norm();
         Self {
             range_m,
             unit_ecef: (position - receiver_ecef_m) / range_m,
             satellite_position_ecef_m: position,
-            satellite_velocity_ecef_mps: into_reception_frame(
-                &satellite.velocity_ecef_mps,
-                range_m,
-            ),
+            satellite_velocity_ecef_mps: turn.of(&satellite.velocity_ecef_mps),
         }
     }
 
@@ -69,14 +65,27 @@ impl LineOfSight {
     }
 }
 
-/// A vector in the frame of transmission, expressed in the frame a travel of `range_m` later.
-fn into_reception_frame(vector: &Vector3<f64>, range_m: f64) -> Vector3<f64> {
-    let (sin, cos) = (EARTH_RATE_RAD_S * range_m / SPEED_OF_LIGHT_MPS).sin_cos();
-    Vector3::new(
-        cos * vector.x + sin * vector.y,
-        cos * vector.y - sin * vector.x,
-        vector.z,
-    )
+/// How far the frame turns between transmission and reception.
+struct FrameTurn {
+    sin: f64,
+    cos: f64,
+}
+
+impl FrameTurn {
+    /// While a signal travels `range_m`.
+    fn during(range_m: f64) -> Self {
+        let (sin, cos) = (EARTH_RATE_RAD_S * range_m / SPEED_OF_LIGHT_MPS).sin_cos();
+        Self { sin, cos }
+    }
+
+    /// A vector in the frame of transmission, expressed in that of reception.
+    fn of(&self, vector: &Vector3<f64>) -> Vector3<f64> {
+        Vector3::new(
+            self.cos * vector.x + self.sin * vector.y,
+            self.cos * vector.y - self.sin * vector.x,
+            vector.z,
+        )
+    }
 }
 
 #[cfg(test)]
