@@ -13,7 +13,7 @@ use xtask::reproduce::{Making, Paper, reproduce};
 use xtask::scenario::command::{self as scenario, Command};
 use xtask::scenario::make::Level;
 use xtask::tidy::{Severity, tidy, workspace_root};
-use xtask::validate::{front_ends, levels};
+use xtask::validate::{consistency, front_ends, levels, starts};
 
 #[derive(Debug, Parser)]
 #[command(
@@ -105,6 +105,18 @@ enum Validation {
         #[arg(long, value_name = "N", default_value_t = 240)]
         runs: u64,
     },
+    /// Whether the filter of vector tracking errs as it says (NEES, NIS)
+    Consistency {
+        /// Runs of each form of the frequency discriminator
+        #[arg(long, value_name = "N", default_value_t = 100)]
+        runs: u16,
+    },
+    /// Starts of vector tracking anywhere in a frame, while satellites rise and set
+    Starts {
+        /// How many
+        #[arg(long, value_name = "N", default_value_t = 100)]
+        runs: u16,
+    },
 }
 
 fn main() -> ExitCode {
@@ -141,6 +153,16 @@ fn validate(validation: &Validation, out: &mut impl Write) -> Result<ExitCode> {
             let comparison = levels::compare(*runs)?;
             writeln!(out, "{comparison}")?;
             Ok(verdict(comparison.holds()))
+        }
+        Validation::Consistency { runs } => {
+            let table = consistency::table(usize::from(*runs))?;
+            writeln!(out, "{table}")?;
+            Ok(verdict(table.holds()))
+        }
+        Validation::Starts { runs } => {
+            let table = starts::table(usize::from(*runs))?;
+            writeln!(out, "{table}")?;
+            Ok(verdict(table.holds()))
         }
     }
 }

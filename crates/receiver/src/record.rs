@@ -2,7 +2,7 @@
 
 use gnss_nav::{Ephemeris, GpsTime, SatelliteId};
 pub use gnss_signal::tracking::Lock;
-use nalgebra::Vector3;
+use nalgebra::{SMatrix, Vector3};
 use num_complex::Complex64;
 
 /// One thing the pipeline reports. `time_s` counts from the first sample everywhere.
@@ -102,6 +102,20 @@ pub struct PvtRecord {
     pub vertical_protection_m: Option<f64>,
     /// How far it can be relied on.
     pub status: Status,
+    /// What a navigation filter says of its own estimate.
+    pub filter: Option<FilterRecord>,
+}
+
+/// A navigation filter's own view of an epoch.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FilterRecord {
+    /// Covariance of its state by tracking noise and motion alone, m and m/s: what lasts of the errors of
+    /// ephemerides and atmosphere is left out. Order x, vx, y, vy, z, vz (ECEF), clock bias, clock drift.
+    pub covariance: SMatrix<f64, 8, 8>,
+    /// Innovations in sum, each squared over its variance given those before it.
+    pub normalised_innovation_squared: f64,
+    /// How many.
+    pub innovations: usize,
 }
 
 /// Who steers a channel's oscillators.

@@ -1,7 +1,9 @@
-//! Experiments on the generator of signals that take minutes: kept commands, each a table and a verdict.
+//! Experiments that take minutes: kept commands, each a table and a verdict.
 
+pub mod consistency;
 pub mod front_ends;
 pub mod levels;
+pub mod starts;
 
 /// A verdict in words.
 pub(crate) const fn verdict(holds: bool) -> &'static str {

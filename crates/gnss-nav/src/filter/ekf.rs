@@ -163,6 +163,13 @@ impl<Way: Correct> NavFilter for Ekf<Way> {
         self.covariance.interleaved()
     }
 
+    fn covariance_after(&self, interval_s: f64) -> Covariance {
+        let noise = &self.settings.process_noise;
+        self.covariance
+            .propagated(interval_s, noise, &self.state.position_ecef_m)
+            .interleaved()
+    }
+
     fn predict(&mut self, to: GpsTime) -> Result<(), NavError> {
         let interval_s = to - self.state.time;
         if !(interval_s.is_finite() && interval_s >= 0.0) {

@@ -71,6 +71,9 @@ pub trait NavFilter {
     /// Covariance of its error.
     fn covariance(&self) -> Covariance;
 
+    /// What that covariance grows to within `interval_s` (0 or more) without a measurement.
+    fn covariance_after(&self, interval_s: f64) -> Covariance;
+
     /// Carries state and covariance to GPS time `to`, not before the present.
     ///
     /// For an epoch of the receiver's clock `to` is [`NavState::gps_time`] of it.

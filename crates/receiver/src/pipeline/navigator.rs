@@ -79,6 +79,7 @@ pub(super) struct Navigator {
     ionosphere: Option<Klobuchar>,
     use_ionosphere: bool,
     troposphere: bool,
+    errors: ErrorModel,
     mask_rad: f64,
     sample_rate_hz: f64,
     /// Any recent GPS time, to tell weeks apart.
@@ -113,6 +114,7 @@ impl Navigator {
             ionosphere: aiding.ionosphere,
             use_ionosphere: settings.ionosphere,
             troposphere: settings.troposphere,
+            errors: settings.errors,
             mask_rad: settings.elevation_mask_rad,
             sample_rate_hz,
             near: aiding.time,
@@ -205,7 +207,7 @@ impl Navigator {
     /// Until the ionosphere's parameters are known its night-time delay stands in for it, with
     /// room for the day's.
     pub(super) fn model(&self) -> MeasurementModel {
-        let errors = ErrorModel::default();
+        let errors = self.errors;
         let ionosphere_fraction = if self.ionosphere.is_some() {
             errors.ionosphere_fraction
         } else {

@@ -38,6 +38,7 @@ pub(super) fn pvt(time_s: f64, solution: &Solution, source: Source) -> PvtRecord
         sigma_velocity_mps: velocity_variance.sqrt(),
         horizontal_protection_m: None,
         vertical_protection_m: None,
+        filter: None,
         status: if is_contradictory(solution) {
             Status::Unreliable
         } else {

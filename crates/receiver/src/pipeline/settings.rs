@@ -1,6 +1,7 @@
 //! What a run is told: valid values, no text and no files.
 
 use gnss_nav::atmosphere::Klobuchar;
+use gnss_nav::measurement::ErrorModel;
 use gnss_nav::{Ephemeris, GpsTime};
 use gnss_signal::SignalId;
 use gnss_signal::tracking::TrackingSettings;
@@ -28,6 +29,8 @@ pub struct Settings {
     pub ionosphere: bool,
     /// Whether the troposphere model is applied.
     pub troposphere: bool,
+    /// What measurements err by beyond tracking noise. Default: as real ones do.
+    pub errors: ErrorModel,
     /// What is known from elsewhere.
     pub aiding: Aiding,
     /// End of the run, s of signal.
@@ -64,6 +67,7 @@ impl Default for Settings {
             elevation_mask_rad: 0.0,
             ionosphere: true,
             troposphere: true,
+            errors: ErrorModel::default(),
             aiding: Aiding::default(),
             duration_s: None,
             dump_taps: false,

@@ -35,6 +35,7 @@ pub(crate) fn pvt(time_s: f64) -> PvtRecord {
         horizontal_protection_m: None,
         vertical_protection_m: None,
         status: Status::Fix,
+        filter: None,
     }
 }
 

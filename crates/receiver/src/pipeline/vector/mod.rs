@@ -88,6 +88,20 @@ pub(super) struct Member {
 pub(super) struct Epoch {
     pub(super) members: Vec<Member>,
     pub(super) events: Vec<(Option<SatelliteId>, EventKind)>,
+    /// Of the filter's update: normalised innovations squared in sum, and how many.
+    pub(super) normalised_innovation_squared: f64,
+    pub(super) innovations_used: usize,
+}
+
+impl Epoch {
+    /// How old what was measured is, s, in the mean: intervals end with the bits of their satellites, and
+    /// what is measured over one is that of its middle.
+    fn age_s(&self) -> f64 {
+        let measured = self.members.iter().filter(|m| m.raw.is_some());
+        let ages = measured.map(|m| m.epoch.doppler_age_s);
+        let (sum, count) = ages.fold((0.0, 0), |(sum, count), age_s| (sum + age_s, count + 1));
+        sum / f64::from(count.max(1))
+    }
 }
 
 /// What stays the same for all channels of an epoch.
@@ -368,6 +382,8 @@ impl VectorTracking {
         update: &Update,
         epoch: &mut Epoch,
     ) {
+        epoch.normalised_innovation_squared = update.normalised_innovation_squared;
+        epoch.innovations_used = update.used;
         for (innovation, (satellite, disposition)) in
             innovations.satellites().iter().zip(dispositions)
         {

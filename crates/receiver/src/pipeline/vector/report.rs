@@ -11,8 +11,8 @@ use super::{Epoch, Member, Policy, VectorTracking};
 use crate::pipeline::report::observation;
 use crate::pipeline::slot::Slot;
 use crate::record::{
-    self, ChannelRecord, EventKind, InnovationRecord, LoopMembership, ObservationEpoch, PvtRecord,
-    ScoreRecord, Source, Status,
+    self, ChannelRecord, EventKind, FilterRecord, InnovationRecord, LoopMembership,
+    ObservationEpoch, PvtRecord, ScoreRecord, Source, Status,
 };
 
 /// Says what changed in the belief in a satellite.
@@ -49,7 +49,7 @@ impl VectorTracking {
     /// The estimate as a record.
     pub(in crate::pipeline) fn pvt(&self, time_s: f64, epoch: &Epoch) -> PvtRecord {
         let state = self.state();
-        let own = self.filter.covariance();
+        let own = self.filter.covariance_after(epoch.age_s());
         let covariance = self.geometry.map_or(own, |g| g.with_lasting(&own));
         let to_enu = Geodetic::from_ecef(&state.position_ecef_m).enu_from_ecef();
         let enu = to_enu * block(&covariance, 0) * to_enu.transpose();
@@ -72,6 +72,11 @@ impl VectorTracking {
             } else {
                 Status::Predicted
             },
+            filter: Some(FilterRecord {
+                covariance: own,
+                normalised_innovation_squared: epoch.normalised_innovation_squared,
+                innovations: epoch.innovations_used,
+            }),
         }
     }
 
