@@ -188,7 +188,7 @@ fn rate_row(measurement: &Measurement, state: &NavState, expected: &Predicted) -
         observable: Observable::RangeRate,
         gradient: Vector4::new(g.x, g.y, g.z, 1.0),
         residual: measurement.range_rate_mps - predicted_mps,
-        variance: measurement.range_rate_variance_m2,
+        variance: measurement.range_rate_variance_m2 + expected.delay_rate_variance_m2_s2,
     }
 }
 

@@ -24,7 +24,7 @@ impl RateEquation {
             &predicted.line_of_sight,
             measurement.state.clock_drift,
             measurement.range_rate_mps,
-            measurement.range_rate_variance_m2,
+            measurement.range_rate_variance_m2 + predicted.delay_rate_variance_m2_s2,
         )
     }
 
