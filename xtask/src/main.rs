@@ -13,7 +13,7 @@ use xtask::reproduce::{Making, Paper, reproduce};
 use xtask::scenario::command::{self as scenario, Command};
 use xtask::scenario::make::Level;
 use xtask::tidy::{Severity, tidy, workspace_root};
-use xtask::validate::{consistency, front_ends, levels, starts};
+use xtask::validate::{consistency, front_ends, levels, sensitivity, starts};
 
 #[derive(Debug, Parser)]
 #[command(
@@ -111,6 +111,12 @@ enum Validation {
         #[arg(long, value_name = "N", default_value_t = 100)]
         runs: u16,
     },
+    /// Down to which C/N0 vector tracking knows where it is, on a circle, through turns and at rest
+    Sensitivity {
+        /// Runs of each motion
+        #[arg(long, value_name = "N", default_value_t = 16)]
+        runs: u16,
+    },
     /// Starts of vector tracking anywhere in a frame, while satellites rise and set
     Starts {
         /// How many
@@ -156,6 +162,11 @@ fn validate(validation: &Validation, out: &mut impl Write) -> Result<ExitCode> {
         }
         Validation::Consistency { runs } => {
             let table = consistency::table(usize::from(*runs))?;
+            writeln!(out, "{table}")?;
+            Ok(verdict(table.holds()))
+        }
+        Validation::Sensitivity { runs } => {
+            let table = sensitivity::table(usize::from(*runs))?;
             writeln!(out, "{table}")?;
             Ok(verdict(table.holds()))
         }
