@@ -173,6 +173,33 @@ fn a_step_of_the_clock_is_followed_and_reported() {
 }
 
 #[test]
+fn a_step_of_the_clock_by_a_code_period_is_reported_and_the_time_found_again() {
+    let judged = with_fault("{kind=\"clock_jump\",begin_s=50,size_s=1e-3}");
+    let step_s = happened(&judged, 50.0, |k| matches!(k, EventKind::ClockStep { .. }));
+    // A second of bits tells.
+    assert!(step_s.unwrap() <= 51.5, "{step_s:?}");
+    let vector = |k: &EventKind| {
+        matches!(
+            k,
+            EventKind::ModeSwitched {
+                to: LoopMembership::Vector
+            }
+        )
+    };
+    assert!(happened(&judged, step_s.unwrap(), vector).is_some());
+    assert!(judged.epochs.iter().all(|e| e.horizontal_m() < 15.0));
+    // The satellites move by less than a metre in a millisecond.
+    assert!(
+        judged
+            .epochs
+            .iter()
+            .rev()
+            .take(50)
+            .all(|e| e.horizontal_m() < 3.0)
+    );
+}
+
+#[test]
 fn jumps_and_gaps_of_the_samples_are_survived_and_reported() {
     for fault in [
         "{kind=\"clock_jump\",begin_s=50,size_s=-1e-4}",

@@ -13,7 +13,7 @@ use super::loop_filter::{CarrierBandwidth, CarrierLoop, CodeLoop};
 use super::nco::Nco;
 use super::presence::Presence;
 use super::sample_grid::with_taps;
-use super::steered::{Reception, Silence, Steered, SteeredSums, Steering};
+use super::steered::{BitsLate, Reception, Silence, Steered, SteeredSums, Steering};
 use super::{Lock, NavBit, TrackingSettings};
 use crate::Replica;
 
@@ -141,6 +141,15 @@ impl Steady {
 
     pub(super) const fn is_steered(&self) -> bool {
         matches!(self.helm, Helm::Navigation(_))
+    }
+
+    /// How late data bits begin in a steered channel's intervals.
+    pub(super) fn bits_late(&self) -> Option<BitsLate> {
+        let Helm::Navigation(steered) = &self.helm else {
+            return None;
+        };
+        let bit_periods = self.nco.signal.spec().code_periods_per_bit;
+        steered.bits_late(&self.settings.steered, bit_periods)
     }
 
     /// Puts the oscillators where navigation says, from the next integration on.

@@ -95,6 +95,11 @@ impl<B: CorrelatorBank> Run<'_, B> {
                 self.navigator.time_jumped();
                 self.leave_vector_tracking(now)
             }
+            Outlook::Slipped => {
+                self.navigator.time_jumped();
+                self.leave_vector_tracking(now)?;
+                self.abandon_channels(now)
+            }
         }
     }
 

@@ -8,7 +8,7 @@ use super::nco::Nco;
 use super::pull_in::{PullInEstimate, Stretch};
 use super::sample_grid::{early_prompt_late, with_taps};
 use super::steady::Steady;
-use super::steered::Steering;
+use super::steered::{BitsLate, Steering};
 use super::{Lock, NoiseFloor, TrackingSettings, cn0};
 use crate::{AcquisitionHit, FrontEnd, Replica, SignalId, TapOffsets, Taps};
 
@@ -157,6 +157,16 @@ impl Channel {
     pub fn release(&mut self, code_variance_chips2: f64) {
         if let Stage::Steady(steady) = &mut self.stage {
             steady.release(code_variance_chips2);
+        }
+    }
+
+    /// How late data bits begin against where they are taken to; `None` where navigation does not steer over
+    /// whole bits, or too few have changed sign.
+    #[must_use]
+    pub fn bits_late(&self) -> Option<BitsLate> {
+        match &self.stage {
+            Stage::Steady(steady) => steady.bits_late(),
+            _ => None,
         }
     }
 

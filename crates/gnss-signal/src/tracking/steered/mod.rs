@@ -5,6 +5,7 @@
 //! between intervals, so that errors stay white, and no bit edge falls between the halves, so that
 //! the sign of the bit does not matter.
 
+mod alignment;
 #[cfg(test)]
 mod tests;
 
@@ -16,6 +17,8 @@ use num_complex::Complex64;
 use super::discriminator::{CodeDiscriminator, EarlyPromptLate, FrequencyDiscriminator};
 use super::epoch::EpochValues;
 use super::presence::Presence;
+use alignment::Alignment;
+pub use alignment::BitsLate;
 
 /// Where navigation puts the oscillators of a channel.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -228,6 +231,7 @@ pub(super) struct Steered {
     measured: Vec<Measured>,
     /// Tick and Doppler cycles at the end of each of the last integrations in carrier lock.
     locked: VecDeque<(u64, f64)>,
+    alignment: Alignment,
 }
 
 impl Steered {
@@ -238,6 +242,7 @@ impl Steered {
             interval: Interval::default(),
             measured: Vec::new(),
             locked: VecDeque::new(),
+            alignment: Alignment::default(),
         }
     }
 
@@ -286,6 +291,11 @@ impl Steered {
             shifted_chips: whole.mean(whole.shifted_chips),
             frequency: pair.map(|(a, b)| frequency(&a, &b, settings.pairs, reception)),
         };
+        if self.presence.is_present() {
+            self.alignment.observe(first.prompt, second.prompt);
+        } else {
+            self.alignment.interrupt();
+        }
         // The interval in which a signal returns is only partly its own.
         if self.presence.is_present() || settings.silence == Silence::Measured {
             self.measured.push(measured);
@@ -318,6 +328,16 @@ impl Steered {
             doppler_variance_hz2: reception.frequency_variance_hz2(sums_s) / pairs,
             doppler_at_s: (pairs > 0.0).then(|| frequencies().map(|f| f.at_s).sum::<f64>() / pairs),
         })
+    }
+
+    /// How late data bits of `bit_periods` begin; `None` where that is not known or intervals are shorter.
+    pub(super) fn bits_late(
+        &self,
+        settings: &SteeredSettings,
+        bit_periods: u32,
+    ) -> Option<BitsLate> {
+        let whole = settings.interval_periods == bit_periods;
+        whole.then(|| self.alignment.bits_late(f64::from(bit_periods) / 2.0))?
     }
 
     /// A new epoch begins.

@@ -3,6 +3,7 @@
 //! This is the one edge along which data goes up: what each channel is steered to follows from the
 //! state of the filter, one epoch later.
 
+mod bit_slip;
 mod clock_step;
 mod filter;
 mod report;
@@ -67,6 +68,8 @@ pub(super) enum Outlook {
     /// Most channels contradict the filter and no solution reconciles them: not even the time is
     /// certain.
     Contradicted,
+    /// The bits of all channels have slipped: the time is wrong by whole code periods.
+    Slipped,
 }
 
 /// One channel at an epoch.
@@ -208,6 +211,11 @@ impl VectorTracking {
         self.update(&measurements, &mut epoch)?;
         if self.contradicting >= CONTRADICTING {
             self.outlook = Outlook::Contradicted;
+        }
+        let channels = slots.iter().map(|slot| &slot.channel);
+        if let Some(size_m) = bit_slip::find(channels) {
+            self.outlook = Outlook::Slipped;
+            epoch.events.push((None, EventKind::ClockStep { size_m }));
         }
         self.remember_velocity();
         self.steer(around, &epoch.members, slots);
