@@ -69,10 +69,10 @@ enum Task {
         /// Which paper.
         #[arg(value_enum)]
         paper: Paper,
-        /// How the signals of jiang2017 are made [default: if]
+        /// How the signals of jiang2017 and li2019 are made [default: if, and correlator]
         #[arg(long, value_enum)]
         level: Option<Level>,
-        /// Seeds of each scenario of jiang2017 [default: 8]
+        /// Seeds of each scenario of jiang2017 and li2019 [default: 8 and 12]
         #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
         seeds: Option<u16>,
         /// Folder that receives a folder of the paper's name.
