@@ -113,13 +113,13 @@ pub mod place {
 pub fn all(theory: &Theory) -> Vec<Receiver> {
     let mut receivers = vec![
         Receiver {
-            key: "single_point_phase_loops".to_owned(),
+            key: "single_points_phase_loops".to_owned(),
             label: "single points, PLL Doppler".to_owned(),
             kind: Kind::PhaseLoops,
             part: Part::Table,
         },
         frequency_loops(
-            "single_point_frequency_loops",
+            "single_points_frequency_loops",
             theory.loop_setting_hz,
             Part::Table,
         ),
@@ -202,13 +202,13 @@ fn frequency_loops(key: &str, setting_hz: f64, part: Part) -> Receiver {
 /// Receivers of other bandwidths.
 fn curves() -> Vec<Receiver> {
     let loops = LOOP_SETTINGS_HZ.map(|hz| {
-        let key = format!("single_point_frequency_loops_{hz}_hz");
+        let key = format!("single_points_frequency_loops_{hz}_hz");
         frequency_loops(&key, hz, Part::Curve)
     });
     let mut receivers = loops.to_vec();
     for (name, own) in [
         ("vector", Vector::PRODUCT),
-        ("vector_discriminators", Vector::DISCRIMINATORS),
+        ("vector, discriminators alone", Vector::DISCRIMINATORS),
     ] {
         receivers.extend(DENSITIES_M2_PER_S3.map(|q_a_m2_per_s3| {
             let of = Vector {
@@ -216,8 +216,7 @@ fn curves() -> Vec<Receiver> {
                 ..own
             };
             let label = format!("{name}, q_a = {q_a_m2_per_s3} m^2/s^3");
-            let key = format!("{name}_q_a_{q_a_m2_per_s3}").replace('.', "_");
-            vector(key, label, of, Part::Curve)
+            vector(key(&label), label, of, Part::Curve)
         }));
     }
     receivers
