@@ -22,4 +22,4 @@ pub use epoch::ChannelEpoch;
 pub use lock::Lock;
 pub use noise::NoiseFloor;
 pub use settings::{Spectrum, TrackingSettings};
-pub use steered::{FrequencyPairs, Silence, SteeredSettings, Steering};
+pub use steered::{FrequencyPairs, Reception, Silence, SteeredSettings, Steering};
