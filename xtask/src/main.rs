@@ -13,6 +13,7 @@ use xtask::reproduce::{Making, Paper, reproduce};
 use xtask::scenario::command::{self as scenario, Command};
 use xtask::scenario::make::Level;
 use xtask::tidy::{Severity, tidy, workspace_root};
+use xtask::validate::threshold::Thresholds;
 use xtask::validate::{front_ends, levels};
 
 #[derive(Debug, Parser)]
@@ -105,6 +106,12 @@ enum Validation {
         #[arg(long, value_name = "N", default_value_t = 240)]
         runs: u64,
     },
+    /// The C/N0 at which channels are lost, steered by one filter against loops that share nothing
+    Threshold {
+        /// Runs of each point
+        #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u16).range(1..))]
+        runs: u16,
+    },
 }
 
 fn main() -> ExitCode {
@@ -141,6 +148,11 @@ fn validate(validation: &Validation, out: &mut impl Write) -> Result<ExitCode> {
             let comparison = levels::compare(*runs)?;
             writeln!(out, "{comparison}")?;
             Ok(verdict(comparison.holds()))
+        }
+        Validation::Threshold { runs } => {
+            let thresholds = Thresholds::sweep(usize::from(*runs))?;
+            writeln!(out, "{thresholds}")?;
+            Ok(verdict(thresholds.holds()))
         }
     }
 }

@@ -2,6 +2,7 @@
 
 pub mod front_ends;
 pub mod levels;
+pub mod threshold;
 
 /// A verdict in words.
 pub(crate) const fn verdict(holds: bool) -> &'static str {
