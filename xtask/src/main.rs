@@ -13,6 +13,7 @@ use xtask::reproduce::{Making, Paper, reproduce};
 use xtask::scenario::command::{self as scenario, Command};
 use xtask::scenario::make::Level;
 use xtask::tidy::{Severity, tidy, workspace_root};
+use xtask::validate::threshold::Thresholds;
 use xtask::validate::{consistency, front_ends, levels, sensitivity, starts};
 
 #[derive(Debug, Parser)]
@@ -69,10 +70,10 @@ enum Task {
         /// Which paper.
         #[arg(value_enum)]
         paper: Paper,
-        /// How the signals of jiang2017 are made [default: if]
+        /// How the signals of jiang2017 and li2019 are made [default: if, and correlator]
         #[arg(long, value_enum)]
         level: Option<Level>,
-        /// Seeds of each scenario of jiang2017 [default: 8]
+        /// Seeds of each scenario of jiang2017 and li2019 [default: 8 and 12]
         #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
         seeds: Option<u16>,
         /// Folder that receives a folder of the paper's name.
@@ -123,6 +124,12 @@ enum Validation {
         #[arg(long, value_name = "N", default_value_t = 100)]
         runs: u16,
     },
+    /// The C/N0 at which channels are lost, steered by one filter against loops that share nothing
+    Threshold {
+        /// Runs of each point
+        #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u16).range(1..))]
+        runs: u16,
+    },
 }
 
 fn main() -> ExitCode {
@@ -145,37 +152,38 @@ const fn verdict(holds: bool) -> ExitCode {
 }
 
 fn validate(validation: &Validation, out: &mut impl Write) -> Result<ExitCode> {
-    match validation {
+    let (text, holds) = match validation {
         Validation::FrontEnds {
             duration,
             seed,
             out: folder,
         } => {
             let table = front_ends::table(*duration, *seed, folder)?;
-            writeln!(out, "{table}")?;
-            Ok(verdict(table.holds()))
+            (table.to_string(), table.holds())
         }
         Validation::Levels { runs } => {
             let comparison = levels::compare(*runs)?;
-            writeln!(out, "{comparison}")?;
-            Ok(verdict(comparison.holds()))
+            (comparison.to_string(), comparison.holds())
         }
         Validation::Consistency { runs } => {
             let table = consistency::table(usize::from(*runs))?;
-            writeln!(out, "{table}")?;
-            Ok(verdict(table.holds()))
+            (table.to_string(), table.holds())
         }
         Validation::Sensitivity { runs } => {
             let table = sensitivity::table(usize::from(*runs))?;
-            writeln!(out, "{table}")?;
-            Ok(verdict(table.holds()))
+            (table.to_string(), table.holds())
         }
         Validation::Starts { runs } => {
             let table = starts::table(usize::from(*runs))?;
-            writeln!(out, "{table}")?;
-            Ok(verdict(table.holds()))
+            (table.to_string(), table.holds())
         }
-    }
+        Validation::Threshold { runs } => {
+            let thresholds = Thresholds::sweep(usize::from(*runs))?;
+            (thresholds.to_string(), thresholds.holds())
+        }
+    };
+    writeln!(out, "{text}")?;
+    Ok(verdict(holds))
 }
 
 fn perform(task: Task) -> Result<ExitCode> {

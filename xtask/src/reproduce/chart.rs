@@ -18,6 +18,15 @@ pub const GREEN: RGBColor = RGBColor(30, 130, 60);
 /// Orange: a fourth.
 pub const ORANGE: RGBColor = RGBColor(220, 130, 0);
 
+/// How points are drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stroke {
+    /// Joined.
+    Line,
+    /// Each by itself: what lies between is not known.
+    Dots,
+}
+
 /// Points of one name and colour.
 #[derive(Debug, Clone)]
 pub struct Series {
@@ -25,12 +34,14 @@ pub struct Series {
     pub label: String,
     /// Colour.
     pub colour: RGBColor,
+    /// Whether they are joined.
+    pub stroke: Stroke,
     /// Points, in the order in which they are joined.
     pub points: Vec<(f64, f64)>,
 }
 
 /// One chart.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Chart {
     /// Above it.
     pub caption: String,
@@ -42,6 +53,8 @@ pub struct Chart {
     pub series: Vec<Series>,
     /// Lines across at which something happens, by x.
     pub marked: Vec<f64>,
+    /// Stretches of x over which something lasts, first and last.
+    pub shaded: Vec<(f64, f64)>,
 }
 
 /// What drawing returns.
@@ -100,19 +113,34 @@ fn draw_chart(area: &Area<'_>, chart: &Chart) -> Drawn<()> {
         .light_line_style(BLACK.mix(0.05))
         .bold_line_style(BLACK.mix(0.12))
         .draw()?;
+    let stretches = chart.shaded.iter().map(|(from, to)| {
+        let corners = [(*from, across.start), (*to, across.end)];
+        Rectangle::new(corners, BLACK.mix(0.1).filled())
+    });
+    drawing.draw_series(stretches)?;
     for at in &chart.marked {
         let ends = [(*at, across.start), (*at, across.end)];
         drawing.draw_series(DashedLineSeries::new(ends, 6, 4, BLACK.stroke_width(1)))?;
     }
     for series in &chart.series {
-        let colour = series.colour;
-        let points = series.points.iter().copied();
-        let drawn = drawing.draw_series(LineSeries::new(points, colour.stroke_width(1)))?;
-        drawn
-            .label(&series.label)
-            .legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], colour.stroke_width(3)));
+        draw_series(&mut drawing, series)?;
     }
     legend(&mut drawing)
+}
+
+fn draw_series(drawing: &mut Drawing<'_, '_>, series: &Series) -> Drawn<()> {
+    let colour = series.colour;
+    let points = series.points.iter().copied();
+    let drawn = match series.stroke {
+        Stroke::Line => drawing.draw_series(LineSeries::new(points, colour.stroke_width(1)))?,
+        Stroke::Dots => {
+            drawing.draw_series(points.map(|at| Circle::new(at, 2, colour.filled())))?
+        }
+    };
+    drawn
+        .label(&series.label)
+        .legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], colour.stroke_width(3)));
+    Ok(())
 }
 
 /// The names of the series in the upper left corner.
@@ -159,11 +187,22 @@ mod tests {
             series: vec![Series {
                 label: "ours".to_owned(),
                 colour: BLUE,
+                stroke: Stroke::Line,
                 points: vec![(0.0, 1.0), (1.0, 3.0)],
             }],
             marked: vec![0.5],
+            shaded: vec![(0.2, 0.4)],
         };
-        let svg = picture("Figure 1", &[chart.clone(), chart]).unwrap();
+        let dots = |series: &Series| Series {
+            stroke: Stroke::Dots,
+            ..series.clone()
+        };
+        let dotted = Chart {
+            series: chart.series.iter().map(dots).collect(),
+            ..chart.clone()
+        };
+        let svg = picture("Figure 1", &[chart, dotted]).unwrap();
+        assert_eq!(svg.matches("<circle").count(), 2);
         for text in ["Figure 1", "Error", "time (s)", "error (m)", "ours"] {
             assert!(svg.contains(text), "{text}");
         }

@@ -2,6 +2,7 @@
 
 pub mod chart;
 pub mod jiang2017;
+pub mod li2019;
 mod outcome;
 pub mod report;
 pub mod wang2016;
@@ -48,11 +49,12 @@ pub struct Making {
 pub fn reproduce(paper: Paper, making: Making, out: &Path) -> Result<Outcome> {
     let outcome = match paper {
         Paper::Jiang2017 => jiang2017::reproduce(making)?,
+        Paper::Li2019 => li2019::reproduce(making)?,
         Paper::Wang2016 => wang2016::reproduce()?,
-        Paper::Zhu2020 | Paper::Zhang2014 | Paper::Li2019 | Paper::All => {
+        Paper::Zhu2020 | Paper::Zhang2014 | Paper::All => {
             let name = paper.to_possible_value();
             let name = name.as_ref().map_or("this paper", |value| value.get_name());
-            bail!("reproduce {name}: not there yet; jiang2017 and wang2016 are");
+            bail!("reproduce {name}: not there yet; jiang2017, wang2016 and li2019 are");
         }
     };
     outcome.write(out)?;

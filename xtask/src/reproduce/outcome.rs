@@ -79,6 +79,8 @@ pub struct Outcome {
     pub report: String,
     /// Pictures: file name and SVG.
     pub pictures: Vec<(String, String)>,
+    /// Tables too long for the report: file name and CSV.
+    pub tables: Vec<(String, String)>,
 }
 
 impl Outcome {
@@ -100,8 +102,9 @@ impl Outcome {
         });
         let summary = serde_json::to_string_pretty(&summary)? + "\n";
         let texts = [("summary.json", &summary), ("report.md", &self.report)];
-        let pictures = self.pictures.iter().map(|(name, svg)| (name.as_str(), svg));
-        for (name, text) in texts.into_iter().chain(pictures) {
+        let others = self.pictures.iter().chain(&self.tables);
+        let others = others.map(|(name, text)| (name.as_str(), text));
+        for (name, text) in texts.into_iter().chain(others) {
             let path = folder.join(name);
             fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))?;
         }
@@ -155,6 +158,7 @@ mod tests {
             checks: vec![Check::at_most("delay".to_owned(), 1.0, 2.0, "s")],
             report: "# Report\n".to_owned(),
             pictures: vec![("figure1.svg".to_owned(), "<svg/>".to_owned())],
+            tables: vec![("errors.csv".to_owned(), "time_s\n".to_owned())],
         };
         outcome.write(&folder).unwrap();
         let below = folder.join("nobody1999");
@@ -167,6 +171,10 @@ mod tests {
         assert_eq!(
             fs::read_to_string(below.join("figure1.svg")).unwrap(),
             "<svg/>"
+        );
+        assert_eq!(
+            fs::read_to_string(below.join("errors.csv")).unwrap(),
+            "time_s\n"
         );
         fs::remove_dir_all(&folder).unwrap();
     }

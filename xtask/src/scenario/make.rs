@@ -33,6 +33,17 @@ pub enum Level {
     Correlator,
 }
 
+impl Level {
+    /// Name in summaries.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::If => "if",
+            Self::Correlator => "correlator",
+        }
+    }
+}
+
 /// Writes samples with their SigMF sidecar, receiver.toml, truth.csv, satellites.csv, faults.csv and
 /// navigation.rnx to `directory`; at the correlator level, which has no samples, all but the first
 /// two.

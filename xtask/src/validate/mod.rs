@@ -5,6 +5,7 @@ pub mod front_ends;
 pub mod levels;
 pub mod sensitivity;
 pub mod starts;
+pub mod threshold;
 
 /// A verdict in words.
 pub(crate) const fn verdict(holds: bool) -> &'static str {

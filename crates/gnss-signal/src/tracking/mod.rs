@@ -22,4 +22,4 @@ pub use epoch::ChannelEpoch;
 pub use lock::Lock;
 pub use noise::NoiseFloor;
 pub use settings::{Spectrum, TrackingSettings};
-pub use steered::{BitsLate, FrequencyPairs, Silence, SteeredSettings, Steering};
+pub use steered::{BitsLate, FrequencyPairs, Reception, Silence, SteeredSettings, Steering};

@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 
 use super::receivers::Variant;
 use super::study::{Case, SETTLING_S, Study};
-use crate::reproduce::chart::{BLUE, Chart, GREEN, ORANGE, RED, Series, picture};
+use crate::reproduce::chart::{BLUE, Chart, GREEN, ORANGE, RED, Series, Stroke, picture};
 
 /// The run that is drawn, by number.
 const DRAWN: usize = 0;
@@ -53,10 +53,12 @@ fn axes(
             .map(|(variant, colour)| Series {
                 label: label(*variant, with, without),
                 colour: *colour,
+                stroke: Stroke::Line,
                 points: points(case, *variant, value),
             })
             .collect(),
         marked: vec![case.blockage.begin_s],
+        ..Chart::default()
     };
     vec![chart("X", |e| e.x), chart("Y", |e| e.y)]
 }

@@ -31,6 +31,7 @@ pub fn reproduce(making: Making) -> Result<Outcome> {
         figures: report::figures(&study),
         report: report::report(&study, &checks),
         pictures: figures::pictures(&study)?,
+        tables: Vec::new(),
         checks,
     })
 }

@@ -20,16 +20,9 @@ pub fn figures(study: &Study) -> Value {
         (case.blockage.name.to_owned(), Value::Object(receivers))
     });
     let mut figures: serde_json::Map<_, _> = cases.collect();
-    figures.insert("level".to_owned(), json!(level_name(study.level)));
+    figures.insert("level".to_owned(), json!(study.level.name()));
     figures.insert("settling_s".to_owned(), json!(SETTLING_S));
     Value::Object(figures)
-}
-
-const fn level_name(level: Level) -> &'static str {
-    match level {
-        Level::If => "if",
-        Level::Correlator => "correlator",
-    }
 }
 
 fn of(case: &Case, variant: Variant) -> Value {

@@ -45,6 +45,7 @@ pub fn reproduce() -> Result<Outcome> {
         figures: report::figures(&study, &calibrated),
         report: report::report(&study, &calibrated, &checks)?,
         pictures: shown.pictures()?,
+        tables: Vec::new(),
         checks,
     })
 }

@@ -6,19 +6,21 @@
 //! the sign of the bit does not matter.
 
 mod alignment;
+mod reception;
 #[cfg(test)]
 mod tests;
 
 use std::collections::VecDeque;
-use std::f64::consts::TAU;
 
 use num_complex::Complex64;
 
-use super::discriminator::{CodeDiscriminator, EarlyPromptLate, FrequencyDiscriminator};
+use super::discriminator::{EarlyPromptLate, FrequencyDiscriminator};
 use super::epoch::EpochValues;
 use super::presence::Presence;
 use alignment::Alignment;
 pub use alignment::BitsLate;
+
+pub use reception::Reception;
 
 /// Where navigation puts the oscillators of a channel.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -89,16 +91,9 @@ impl SteeredSettings {
     }
 }
 
-/// Ratio of signal to noise of an interval below which its own power does not normalise errors:
-/// it would be mostly noise.
-const WEAK_SNR: f64 = 4.0;
 /// Integrations over which the Doppler of a locked carrier is a mean: with 10 ms a tenth of a second,
 /// short against the changes of a car's acceleration.
 const LOCKED_INTEGRATIONS: usize = 10;
-/// No signal further away than this reaches the early or late tap, chips.
-const LARGEST_CHIPS: f64 = 1.5;
-/// C/N0 below which signals are not told apart, Hz (8 dB-Hz): its estimate is noise.
-const LOWEST_CN0_HZ: f64 = 6.0;
 
 /// One integration as an interval takes it.
 #[derive(Debug, Clone, Copy)]
@@ -186,14 +181,6 @@ struct Interval {
     first: Part,
     second: Part,
     previous: Option<Part>,
-}
-
-/// What the sums of a signal are worth: its C/N0, and the spacing of its taps.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Reception {
-    pub(super) cn0_hz: f64,
-    pub(super) spacing_chips: f64,
-    pub(super) period_s: f64,
 }
 
 impl Interval {
@@ -346,61 +333,28 @@ impl Steered {
     }
 }
 
-impl Reception {
-    /// Signal over noise of `interval_s`, no less than what weak signals still can be told by.
-    fn snr(&self, interval_s: f64) -> f64 {
-        self.cn0_hz.max(LOWEST_CN0_HZ) * interval_s
-    }
-
-    /// Variance of the code error of coherent sums over `interval_s`, chips^2 (Kaplan2017, 8.95; of the
-    /// envelope's error the squaring loss is half of the power's).
-    fn code_variance_chips2(&self, interval_s: f64) -> f64 {
-        let (d, c) = (self.spacing_chips, self.snr(interval_s));
-        let squaring = if c > WEAK_SNR { 1.0 } else { 2.0 };
-        d / (4.0 * c) * (1.0 + squaring / ((2.0 - d) * c))
-    }
-
-    /// Variance of the frequency between two sums of `sums_s` each, their middles that far apart,
-    /// Hz^2.
-    fn frequency_variance_hz2(&self, sums_s: f64) -> f64 {
-        let c = self.snr(sums_s);
-        (1.0 + 0.5 / c) / c / (TAU * sums_s).powi(2)
-    }
-}
-
-/// Code error of coherent sums: the envelope's, or, of a weak signal, the power's over the power
-/// that its C/N0 promises, whose noise does not take away its slope.
+/// Code error of coherent sums.
 fn code_error_chips(sums: &Part, reception: &Reception) -> f64 {
     let taps = EarlyPromptLate {
         early: sums.early,
         prompt: sums.prompt,
         late: sums.late,
     };
-    let snr = reception.snr(sums.periods as f64 * reception.period_s);
-    if snr > WEAK_SNR {
-        return CodeDiscriminator::Envelope.error_chips(&taps, reception.spacing_chips);
-    }
-    let peak = 1.0 - reception.spacing_chips / 2.0;
-    let power = snr * sums.noise_variance;
-    let error = (taps.early.norm_sqr() - taps.late.norm_sqr()) / (4.0 * peak * power);
-    error.clamp(-LARGEST_CHIPS, LARGEST_CHIPS)
+    let sums_s = sums.periods as f64 * reception.period_s;
+    reception.code_error_chips(&taps, sums.noise_variance, sums_s)
 }
 
 fn frequency(a: &Part, b: &Part, pairs: FrequencyPairs, reception: &Reception) -> Frequency {
     let apart_s = b.mean(b.middle_s) - a.mean(a.middle_s);
     let oscillator_hz = (b.mean(b.cycles) - a.mean(a.cycles)) / apart_s;
-    let snr = reception.snr(a.periods as f64 * reception.period_s);
     let error_hz = match pairs {
         FrequencyPairs::Successive => {
             FrequencyDiscriminator::CrossSignDot.error_hz(a.prompt, b.prompt, apart_s)
         }
-        FrequencyPairs::Halves if 2.0 * snr > WEAK_SNR => {
-            FrequencyDiscriminator::FourQuadrant.error_hz(a.prompt, b.prompt, apart_s)
-        }
         FrequencyPairs::Halves => {
-            let power = snr * (a.noise_variance + b.noise_variance) / 2.0;
-            let cross = (b.prompt * a.prompt.conj()).im;
-            (cross / power).clamp(-TAU / 2.0, TAU / 2.0) / (TAU * apart_s)
+            let sums_s = a.periods as f64 * reception.period_s;
+            let noise_variance = (a.noise_variance + b.noise_variance) / 2.0;
+            reception.frequency_error_hz([a.prompt, b.prompt], noise_variance, sums_s, apart_s)
         }
     };
     Frequency {
