@@ -8,7 +8,7 @@ use nalgebra::Matrix3;
 
 use super::watch::{Change, Watch};
 use super::{Epoch, Member, Policy, VectorTracking};
-use crate::pipeline::report::observation;
+use crate::pipeline::report::{observation, tracking};
 use crate::pipeline::slot::Slot;
 use crate::record::{
     self, ChannelRecord, EventKind, InnovationRecord, LoopMembership, ObservationEpoch, PvtRecord,
@@ -31,6 +31,7 @@ pub(super) fn change(
                     monitor,
                     score,
                     threshold,
+                    residual_m: None,
                 }
             } else {
                 EventKind::Alarm {
@@ -52,7 +53,8 @@ impl VectorTracking {
         let own = self.filter.covariance();
         let covariance = self.geometry.map_or(own, |g| g.with_lasting(&own));
         let to_enu = Geodetic::from_ecef(&state.position_ecef_m).enu_from_ecef();
-        let enu = to_enu * block(&covariance, 0) * to_enu.transpose();
+        let position_covariance = block(&covariance, 0);
+        let enu = to_enu * position_covariance * to_enu.transpose();
         PvtRecord {
             time_s,
             time: state.time,
@@ -64,6 +66,7 @@ impl VectorTracking {
             pdop: self.geometry.map_or(f64::INFINITY, |g| g.pdop),
             source: Source::Filter,
             sigma_enu_m: [enu[(0, 0)].sqrt(), enu[(1, 1)].sqrt(), enu[(2, 2)].sqrt()],
+            position_covariance_ecef_m2: position_covariance,
             sigma_velocity_mps: block(&covariance, 1).trace().sqrt(),
             horizontal_protection_m: None,
             vertical_protection_m: None,
@@ -85,12 +88,8 @@ impl VectorTracking {
         ChannelRecord {
             time_s,
             satellite: member.satellite,
-            cn0_dbhz: epoch.cn0_dbhz,
-            lock: epoch.lock,
-            membership: LoopMembership::Vector,
-            prompt: epoch.prompt,
-            code_error_chips: epoch.code_error_chips,
-            frequency_error_hz: epoch.frequency_error_hz,
+            cn0_dbhz: Some(epoch.cn0_dbhz),
+            tracking: Some(tracking(epoch, LoopMembership::Vector)),
             pseudorange_m: member.raw.map(|r| r.pseudorange_m),
             range_rate_mps: member.raw.map(|r| r.range_rate_mps),
             innovation_code_m: code,

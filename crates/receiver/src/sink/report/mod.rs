@@ -99,7 +99,9 @@ impl Report {
 
     fn channel(&mut self, channel: &ChannelRecord) {
         let history = self.satellites.entry(channel.satellite).or_default();
-        history.cn0_dbhz.push(channel.time_s, channel.cn0_dbhz);
+        if let Some(cn0_dbhz) = channel.cn0_dbhz {
+            history.cn0_dbhz.push(channel.time_s, cn0_dbhz);
+        }
         if let Some(InnovationRecord { value, sigma }) = channel.innovation_code_m {
             history.innovation.push(channel.time_s, value / sigma);
         }
