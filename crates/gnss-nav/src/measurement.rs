@@ -122,8 +122,8 @@ fn join(
 
 /// Variance that tracking noise does not cover.
 ///
-/// sigma^2 = (ura_fraction URA)^2 + (ionosphere_fraction I)^2 + (troposphere_fraction T)^2
-/// + (multipath_zenith_m / sin elevation)^2 plus, at low elevation, what the shape of the troposphere model is wrong by, where
+/// sigma^2 = (ura_fraction URA)^2 + (ionosphere_fraction I)^2 + (troposphere_fraction T)^2 +
+/// (multipath_zenith_m / sin elevation)^2 plus, at low elevation, what the shape of the troposphere model is wrong by, where
 /// I and T are the modelled delays: a delay that is switched off adds nothing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ErrorModel {

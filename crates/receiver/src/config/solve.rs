@@ -7,7 +7,7 @@ use clap::Args;
 use super::check::{Checks, Origin};
 use super::{Ionosphere, Troposphere};
 use crate::ReceiverError;
-use crate::solve::{SolveSettings, Weights};
+use crate::solve::{KinematicSettings, SolveSettings, Weights};
 use gnss_nav::integrity::IntegritySettings;
 
 /// Options of `receiver solve`.
@@ -26,6 +26,10 @@ pub struct SolveOptions {
     /// Probability that the test of a fault-free epoch fails, 1e-12 to 0.1 [default: 1e-5]
     #[arg(long, value_name = "P")]
     pub false_alarm: Option<f64>,
+    /// Filter from epoch to epoch: none, or ekf (kinematic, on pseudoranges and Dopplers)
+    /// [default: none]
+    #[arg(long, value_name = "FILTER")]
+    pub filter: Option<String>,
     /// Add an error to a satellite's pseudoranges: SAT:METRES@SECONDS a step,
     /// SAT:METRES_A_SECOND@SECONDS:ramp a ramp, seconds since the first epoch; may be repeated
     #[arg(long, value_name = "FAULT", allow_hyphen_values = true)]
@@ -114,6 +118,12 @@ impl Checks<'_> {
                 cn0_mask_dbhz: given.cn0_mask.unwrap_or(defaults.cn0_mask_dbhz),
                 weights: self.weights(given)?,
                 integrity: self.integrity(given)?,
+                kinematic: self.choice(
+                    "filter",
+                    given.filter.as_deref(),
+                    "none",
+                    &[("none", None), ("ekf", Some(KinematicSettings::default()))],
+                )?,
                 faults: self.faults(given)?,
             },
             ionosphere: self.ionosphere(given.ionosphere.as_deref())?,

@@ -1,9 +1,10 @@
 //! Records of a navigation epoch.
 
 use gnss_nav::constants::L1_WAVELENGTH_M;
+use gnss_nav::filter::{Covariance, Innovation};
 use gnss_nav::geodesy::Geodetic;
 use gnss_nav::least_squares::Solution;
-use gnss_nav::{RawMeasurement, SatelliteId, chi_square_threshold};
+use gnss_nav::{NavState, RawMeasurement, SatelliteId, chi_square_threshold};
 use gnss_signal::tracking::{ChannelEpoch, Lock};
 use nalgebra::{Matrix3, Vector3};
 
@@ -44,6 +45,49 @@ pub(crate) fn pvt(time_s: f64, solution: &Solution, source: Source) -> PvtRecord
         } else {
             Status::Fix
         },
+    }
+}
+
+/// A filter's estimate as a record; how many satellites made it, and their dilution, is for the caller
+/// to say.
+pub(crate) fn filtered(
+    time_s: f64,
+    state: &NavState,
+    covariance: &Covariance,
+    status: Status,
+) -> PvtRecord {
+    let to_enu = Geodetic::from_ecef(&state.position_ecef_m).enu_from_ecef();
+    let position_covariance = block(covariance, 0);
+    let enu = to_enu * position_covariance * to_enu.transpose();
+    PvtRecord {
+        time_s,
+        time: state.time,
+        position_ecef_m: state.position_ecef_m,
+        velocity_ecef_mps: state.velocity_ecef_mps,
+        clock_bias_m: state.clock_bias_m,
+        clock_drift_mps: state.clock_drift_mps,
+        satellites_used: 0,
+        pdop: f64::INFINITY,
+        source: Source::Filter,
+        sigma_enu_m: [enu[(0, 0)].sqrt(), enu[(1, 1)].sqrt(), enu[(2, 2)].sqrt()],
+        position_covariance_ecef_m2: position_covariance,
+        sigma_velocity_mps: block(covariance, 1).trace().sqrt(),
+        horizontal_protection_m: None,
+        vertical_protection_m: None,
+        status,
+    }
+}
+
+/// The position block (`offset` 0) or the velocity block (1) of a covariance.
+fn block(covariance: &Covariance, offset: usize) -> Matrix3<f64> {
+    Matrix3::from_fn(|row, column| covariance[(2 * row + offset, 2 * column + offset)])
+}
+
+/// An innovation of a filter as a record.
+pub(crate) fn innovation(innovation: &Innovation) -> InnovationRecord {
+    InnovationRecord {
+        value: innovation.value(),
+        sigma: innovation.variance().sqrt(),
     }
 }
 

@@ -4,6 +4,7 @@
 //! from [`crate::pipeline`], to the same sinks.
 
 mod fault;
+mod kinematic;
 mod noise;
 mod report;
 mod session;
@@ -16,6 +17,7 @@ use gnss_nav::Klobuchar;
 use gnss_nav::integrity::IntegritySettings;
 
 pub use fault::{FaultShape, InjectedFault};
+pub use kinematic::KinematicSettings;
 pub use noise::Weights;
 pub use session::SolveSession;
 pub use solver::{SolveOutcome, Solver};
@@ -39,6 +41,8 @@ pub struct SolveSettings {
     pub weights: Weights,
     /// Test of each epoch and exclusion; `None`: neither.
     pub integrity: Option<IntegritySettings>,
+    /// Filter from epoch to epoch; `None`: each epoch by itself.
+    pub kinematic: Option<KinematicSettings>,
     /// Errors added to pseudoranges.
     pub faults: Vec<InjectedFault>,
 }
@@ -53,6 +57,7 @@ impl Default for SolveSettings {
             most_pdop: 15.0,
             weights: Weights::default(),
             integrity: Some(IntegritySettings::default()),
+            kinematic: None,
             faults: Vec::new(),
         }
     }

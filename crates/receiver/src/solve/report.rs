@@ -3,8 +3,10 @@
 use gnss_nav::integrity::{Misfit, Place};
 use gnss_nav::{GpsTime, RawMeasurement};
 
+use super::kinematic::Estimate;
 use super::single_point::Fix;
-use crate::pipeline::solution_record;
+use super::solver::Solved;
+use crate::pipeline::{filter_record, innovation, solution_record};
 use crate::record::{
     CarrierPhase, ChannelRecord, Disposition, EventKind, InnovationRecord, Observation,
     ObservationEpoch, PvtRecord, Source, Status,
@@ -22,6 +24,21 @@ pub(super) fn pvt(time_s: f64, fix: &Fix) -> PvtRecord {
             Status::Unreliable
         },
         ..solution_record(time_s, &fix.solution, Source::LeastSquares)
+    }
+}
+
+/// The filter's estimate.
+pub(super) fn filtered(time_s: f64, estimate: &Estimate) -> PvtRecord {
+    let state = &estimate.state;
+    let status = if estimate.is_determined {
+        Status::Fix
+    } else {
+        Status::Predicted
+    };
+    PvtRecord {
+        satellites_used: estimate.satellites,
+        pdop: estimate.pdop,
+        ..filter_record(time_s, state, &estimate.covariance, status)
     }
 }
 
@@ -64,9 +81,14 @@ pub(super) fn channel(
     time_s: f64,
     observed: &ObservedSatellite,
     raw: &RawMeasurement,
-    fix: Option<&Fix>,
+    solved: &Solved,
 ) -> ChannelRecord {
     let satellite = observed.satellite;
+    let fix = solved.fix.as_ref();
+    let held = solved.estimate.as_ref().and_then(|estimate| {
+        let mut satellites = estimate.innovations.satellites().iter();
+        satellites.find(|s| s.satellite == satellite)
+    });
     let used = fix.and_then(|fix| {
         let mut satellites = fix.solution.satellites.iter();
         satellites.find(|s| s.satellite == satellite)
@@ -74,6 +96,7 @@ pub(super) fn channel(
     let disposition = match fix {
         Some(fix) if fix.excludes(satellite).is_some() => Disposition::Exclude,
         Some(_) if used.is_some() => Disposition::Use,
+        _ if held.is_some() => Disposition::Use,
         _ => Disposition::Unavailable,
     };
     ChannelRecord {
@@ -83,16 +106,22 @@ pub(super) fn channel(
         tracking: None,
         pseudorange_m: Some(raw.pseudorange_m),
         range_rate_mps: observed.doppler_hz.map(|_| raw.range_rate_mps),
-        innovation_code_m: used.map(|u| InnovationRecord {
-            value: u.pseudorange_residual_m,
-            sigma: u.pseudorange_sigma_m,
-        }),
-        innovation_rate_mps: used.and_then(|u| {
-            Some(InnovationRecord {
-                value: u.range_rate_residual_mps?,
-                sigma: raw.range_rate_variance_m2.sqrt(),
-            })
-        }),
+        innovation_code_m: match held {
+            Some(held) => Some(innovation(&held.code)),
+            None => used.map(|u| InnovationRecord {
+                value: u.pseudorange_residual_m,
+                sigma: u.pseudorange_sigma_m,
+            }),
+        },
+        innovation_rate_mps: match held {
+            Some(held) => held.rate.as_ref().map(innovation),
+            None => used.and_then(|u| {
+                Some(InnovationRecord {
+                    value: u.range_rate_residual_mps?,
+                    sigma: raw.range_rate_variance_m2.sqrt(),
+                })
+            }),
+        },
         disposition,
         scores: Vec::new(),
     }

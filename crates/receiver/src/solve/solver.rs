@@ -6,10 +6,11 @@ use gnss_nav::measurement::{self, Formed};
 use gnss_nav::{EphemerisStore, GpsTime, MeasurementModel, RawMeasurement, SatelliteId};
 use nalgebra::Vector3;
 
+use super::kinematic::{Estimate, Kinematic};
 use super::single_point::{self, Fix};
 use super::{InjectedFault, SolveSettings, report};
 use crate::ReceiverError;
-use crate::record::{Event, EventKind, Record};
+use crate::record::{Event, EventKind, PvtRecord, Record, Status};
 use crate::rinex_obs::{ObservedEpoch, ObservedSatellite};
 
 /// Takes a record.
@@ -31,6 +32,17 @@ pub struct Solver {
     counts: Counts,
     /// Injected faults whose satellite has been observed.
     occurred: Vec<bool>,
+    kinematic: Option<Kinematic>,
+}
+
+/// What an epoch gave.
+pub(super) struct Solved {
+    /// By itself.
+    pub(super) fix: Option<Fix>,
+    /// By the filter.
+    pub(super) estimate: Option<Estimate>,
+    /// What is reported of it.
+    pub(super) pvt: Option<PvtRecord>,
 }
 
 /// What the epochs amounted to.
@@ -70,6 +82,9 @@ impl Solver {
             errors: settings.weights.errors(),
         };
         Self {
+            kinematic: settings
+                .kinematic
+                .map(|kinematic| Kinematic::new(kinematic, model)),
             occurred: vec![false; settings.faults.len()],
             settings,
             store,
@@ -117,7 +132,20 @@ impl Solver {
         if let Some(fix) = fix.as_ref().filter(|fix| fix.is_trusted) {
             self.position_ecef_m = fix.solution.position_ecef_m;
         }
-        self.report(time_s, observed, &raw, fix.as_ref(), sink)
+        let estimate = self
+            .kinematic
+            .as_mut()
+            .map(|kinematic| kinematic.epoch(observed.time, &formed.measurements, fix.as_ref()));
+        let pvt = match &estimate {
+            Some(estimate) => estimate.as_ref().map(|e| report::filtered(time_s, e)),
+            None => fix.as_ref().map(|fix| report::pvt(time_s, fix)),
+        };
+        let solved = Solved {
+            fix,
+            estimate: estimate.flatten(),
+            pvt,
+        };
+        self.report(time_s, observed, &raw, &solved, sink)
     }
 
     /// Ends: how it went.
@@ -164,20 +192,21 @@ impl Solver {
         time_s: f64,
         observed: &ObservedEpoch,
         raw: &[RawMeasurement],
-        fix: Option<&Fix>,
+        solved: &Solved,
         sink: &mut Sink<'_>,
     ) -> Result<(), ReceiverError> {
         let satellites = &observed.satellites;
+        let fix = solved.fix.as_ref();
         let epoch = report::observations(time_s, observed.time, satellites, raw, fix);
         sink(Record::Observations(epoch))?;
         for (satellite, raw) in satellites.iter().zip(raw) {
-            let channel = report::channel(time_s, satellite, raw, fix);
+            let channel = report::channel(time_s, satellite, raw, solved);
             sink(Record::Channel(channel))?;
         }
         self.report_exclusions(time_s, fix, sink)?;
-        self.report_availability(time_s, fix, sink)?;
-        match fix {
-            Some(fix) => sink(Record::Pvt(report::pvt(time_s, fix))),
+        self.report_availability(time_s, solved, sink)?;
+        match &solved.pvt {
+            Some(pvt) => sink(Record::Pvt(pvt.clone())),
             None => Ok(()),
         }
     }
@@ -208,10 +237,10 @@ impl Solver {
     fn report_availability(
         &mut self,
         time_s: f64,
-        fix: Option<&Fix>,
+        solved: &Solved,
         sink: &mut Sink<'_>,
     ) -> Result<(), ReceiverError> {
-        let is_fixed = fix.is_some_and(|fix| fix.is_trusted);
+        let is_fixed = solved.pvt.as_ref().is_some_and(|p| p.status == Status::Fix);
         self.counts.fixes += u64::from(is_fixed);
         let kind = match (self.fixed, is_fixed) {
             (None, true) => Some(EventKind::FirstFix),
@@ -227,7 +256,10 @@ impl Solver {
         if self.settings.integrity.is_none() {
             return Ok(());
         }
-        let is_available = fix.is_some_and(|fix| fix.protection.is_some());
+        let is_available = solved
+            .pvt
+            .as_ref()
+            .is_some_and(|pvt| pvt.horizontal_protection_m.is_some());
         if self.is_assured.replace(is_available) == Some(is_available) {
             return Ok(());
         }
