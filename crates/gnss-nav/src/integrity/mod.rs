@@ -157,7 +157,7 @@ pub fn misfits_among<'a>(
 
 /// Residual of a measurement that had no part in `solution`, m, and its variance, m^2; none below
 /// the horizontal, where the delays are not modelled.
-fn residual(
+pub fn residual(
     measurement: &Measurement,
     model: &MeasurementModel,
     solution: &Solution,

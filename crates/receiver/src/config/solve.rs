@@ -7,7 +7,7 @@ use clap::Args;
 use super::check::{Checks, Origin};
 use super::{Ionosphere, Troposphere};
 use crate::ReceiverError;
-use crate::solve::{KinematicSettings, SolveSettings, Weights};
+use crate::solve::{KinematicSettings, ParticleRaim, Raim, SolveSettings, Weights};
 use gnss_nav::integrity::IntegritySettings;
 
 /// Options of `receiver solve`.
@@ -19,11 +19,11 @@ pub struct SolveOptions {
     /// RINEX 2 or 3 navigation files (plain or gzip)
     #[arg(long, value_name = "RINEX", num_args = 1..)]
     pub nav: Vec<PathBuf>,
-    /// Receiver autonomous integrity monitoring: none or ls (residuals and parity space)
-    /// [default: ls]
+    /// Receiver autonomous integrity monitoring: none, ls (residuals and parity space), or particle
+    /// filters for a receiver at rest, pf or pso-pf (moved by a swarm) [default: ls]
     #[arg(long, value_name = "RAIM")]
     pub raim: Option<String>,
-    /// Probability that the test of a fault-free epoch fails, 1e-12 to 0.1 [default: 1e-5]
+    /// With ls: probability that the test of a fault-free epoch fails, 1e-12 to 0.1 [default: 1e-5]
     #[arg(long, value_name = "P")]
     pub false_alarm: Option<f64>,
     /// Filter from epoch to epoch: none, or ekf (kinematic, on pseudoranges and Dopplers)
@@ -56,6 +56,9 @@ pub struct SolveOptions {
     /// pvt.csv afterwards
     #[arg(long, value_name = "TRUTH.csv")]
     pub truth: Option<PathBuf>,
+    /// Seed of the particle filters [default: 0]
+    #[arg(long, value_name = "N")]
+    pub seed: Option<u64>,
     /// Directory for the output files [default: none are written]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
@@ -117,7 +120,8 @@ impl Checks<'_> {
                     .to_radians(),
                 cn0_mask_dbhz: given.cn0_mask.unwrap_or(defaults.cn0_mask_dbhz),
                 weights: self.weights(given)?,
-                integrity: self.integrity(given)?,
+                raim: self.raim(given)?,
+                seed: given.seed.unwrap_or(defaults.seed),
                 kinematic: self.choice(
                     "filter",
                     given.filter.as_deref(),
@@ -149,7 +153,7 @@ impl Checks<'_> {
         self.choice("weights", given.weights.as_deref(), "both", &weights)
     }
 
-    fn integrity(&self, given: &SolveOptions) -> Result<Option<IntegritySettings>, ReceiverError> {
+    fn raim(&self, given: &SolveOptions) -> Result<Raim, ReceiverError> {
         self.number("false-alarm", given.false_alarm, "1e-12 to 0.1", |p| {
             (1e-12..=0.1).contains(&p)
         })?;
@@ -158,7 +162,12 @@ impl Checks<'_> {
             false_alarm_probability: given.false_alarm.unwrap_or(default.false_alarm_probability),
             ..default
         };
-        let monitors = [("none", None), ("ls", Some(settings))];
+        let monitors = [
+            ("none", Raim::None),
+            ("ls", Raim::LeastSquares(settings)),
+            ("pf", Raim::Particle(ParticleRaim::Bootstrap)),
+            ("pso-pf", Raim::Particle(ParticleRaim::Swarm)),
+        ];
         self.choice("raim", given.raim.as_deref(), "ls", &monitors)
     }
 

@@ -6,6 +6,7 @@
 mod fault;
 mod kinematic;
 mod noise;
+mod particle;
 mod report;
 mod session;
 mod single_point;
@@ -19,8 +20,20 @@ use gnss_nav::integrity::IntegritySettings;
 pub use fault::{FaultShape, InjectedFault};
 pub use kinematic::KinematicSettings;
 pub use noise::Weights;
+pub use particle::ParticleRaim;
 pub use session::SolveSession;
 pub use solver::{SolveOutcome, Solver};
+
+/// Receiver autonomous integrity monitoring.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Raim {
+    /// None.
+    None,
+    /// Residuals and parity space, each epoch by itself.
+    LeastSquares(IntegritySettings),
+    /// Particle filters, for a receiver at rest.
+    Particle(ParticleRaim),
+}
 
 /// Settings of [`Solver`].
 #[derive(Debug, Clone, PartialEq)]
@@ -39,8 +52,10 @@ pub struct SolveSettings {
     pub most_pdop: f64,
     /// What a pseudorange's variance is taken from.
     pub weights: Weights,
-    /// Test of each epoch and exclusion; `None`: neither.
-    pub integrity: Option<IntegritySettings>,
+    /// What tests the pseudoranges, and takes out those that do not fit.
+    pub raim: Raim,
+    /// Seed of everything random.
+    pub seed: u64,
     /// Filter from epoch to epoch; `None`: each epoch by itself.
     pub kinematic: Option<KinematicSettings>,
     /// Errors added to pseudoranges.
@@ -56,7 +71,8 @@ impl Default for SolveSettings {
             cn0_mask_dbhz: 25.0,
             most_pdop: 15.0,
             weights: Weights::default(),
-            integrity: Some(IntegritySettings::default()),
+            raim: Raim::LeastSquares(IntegritySettings::default()),
+            seed: 0,
             kinematic: None,
             faults: Vec::new(),
         }

@@ -127,16 +127,16 @@ pub(super) fn channel(
     }
 }
 
-/// Why a satellite is left out, as an event.
-pub(super) fn exclusion(misfit: &Misfit) -> EventKind {
+/// Why a satellite is left out, as an event; `monitor` found it, if not the parity.
+pub(super) fn exclusion(misfit: &Misfit, monitor: Option<&str>) -> EventKind {
     EventKind::Excluded {
         monitor: match misfit.place {
-            Place::InUse => "parity",
+            Place::InUse => monitor.unwrap_or("parity"),
             Place::Unused => "residual_below_mask",
         }
         .to_owned(),
         score: misfit.score,
         threshold: misfit.threshold,
-        residual_m: Some(misfit.residual_m),
+        residual_m: Some(misfit.residual_m).filter(|m| m.is_finite()),
     }
 }

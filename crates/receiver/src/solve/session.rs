@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use gnss_nav::{EphemerisStore, Klobuchar};
 use nalgebra::Vector3;
 
-use super::{InjectedFault, SolveOutcome, Solver};
+use super::{InjectedFault, Raim, SolveOutcome, Solver};
 use crate::ReceiverError;
 use crate::config::{Ionosphere, SolveConfig};
 use crate::cost::Meter;
@@ -42,7 +42,7 @@ impl SolveSession {
         let start = reader.header().position_ecef_m;
         Ok(Self {
             meter,
-            solver: Solver::new(settings, store, start.unwrap_or_else(Vector3::zeros)),
+            solver: Solver::new(settings, store, start.unwrap_or_else(Vector3::zeros))?,
             config,
             reader,
             truth,
@@ -63,6 +63,7 @@ impl SolveSession {
         } = self;
         let mut outputs = Outputs::open(&OutputSettings {
             directory: config.out.clone(),
+            monitors: monitors(&config),
             position_file: true,
             title: "GPS positions from observations".to_owned(),
             ..OutputSettings::default()
@@ -78,6 +79,14 @@ impl SolveSession {
             write_cost(directory, &cost)?;
         }
         Ok(summary)
+    }
+}
+
+/// Monitors whose scores are written.
+fn monitors(config: &SolveConfig) -> Vec<String> {
+    match config.settings.raim {
+        Raim::Particle(which) => vec![which.name().to_owned()],
+        Raim::None | Raim::LeastSquares(_) => Vec::new(),
     }
 }
 

@@ -1,11 +1,9 @@
 //! One epoch by itself: least squares, with or without a test of its integrity.
 
-use gnss_nav::integrity::{self, Misfit, Place, ProtectionLevels};
+use gnss_nav::integrity::{self, IntegritySettings, Misfit, Place, ProtectionLevels};
 use gnss_nav::least_squares::Consistency;
 use gnss_nav::{Measurement, MeasurementModel, NavError, SatelliteId, Solution, least_squares};
 use nalgebra::Vector3;
-
-use super::SolveSettings;
 
 /// Satellites a position needs.
 const NEEDED: usize = 4;
@@ -29,48 +27,77 @@ impl Fix {
     }
 }
 
-/// Solves an epoch from `start_ecef_m`, any place.
+/// The measurements fit for use, and the others.
 ///
-/// Weak satellites stay out and are held against the solution afterwards. With too few strong ones
-/// they come in, and the solution is relied on where all agree.
+/// Weak satellites stay out. With too few strong ones they come in, and a solution is then relied on only where all
+/// agree.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Chosen {
+    pub(super) used: Vec<Measurement>,
+    unused: Vec<Measurement>,
+    with_weak: bool,
+}
+
+impl Chosen {
+    pub(super) fn of(measurements: &[Measurement], cn0_mask_dbhz: f64) -> Self {
+        let is_strong = |m: &Measurement| m.cn0_dbhz >= cn0_mask_dbhz;
+        let with_weak = measurements.iter().filter(|m| is_strong(m)).count() < NEEDED;
+        let (used, unused) = measurements.iter().partition(|m| with_weak || is_strong(m));
+        Self {
+            used,
+            unused,
+            with_weak,
+        }
+    }
+}
+
+/// Solves an epoch from `start_ecef_m`, any place, without a test.
 ///
 /// # Errors
 /// As [`least_squares::solve`].
-pub(super) fn solve(
-    measurements: &[Measurement],
+pub(super) fn untested(
+    chosen: &Chosen,
     model: &MeasurementModel,
     start_ecef_m: &Vector3<f64>,
-    settings: &SolveSettings,
+    most_pdop: f64,
 ) -> Result<Fix, NavError> {
-    let is_strong = |m: &Measurement| m.cn0_dbhz >= settings.cn0_mask_dbhz;
-    let with_weak = measurements.iter().filter(|m| is_strong(m)).count() < NEEDED;
-    let (used, unused): (Vec<Measurement>, Vec<Measurement>) =
-        measurements.iter().partition(|m| with_weak || is_strong(m));
-    let Some(integrity) = &settings.integrity else {
-        let solution = least_squares::solve(&used, model, start_ecef_m)?;
-        return Ok(Fix {
-            is_trusted: !with_weak && solution.dops.pdop <= settings.most_pdop,
-            solution,
-            misfits: Vec::new(),
-            protection: None,
-        });
-    };
-    let assured = integrity::solve(&used, model, start_ecef_m, integrity)?;
+    let solution = least_squares::solve(&chosen.used, model, start_ecef_m)?;
+    Ok(Fix {
+        is_trusted: !chosen.with_weak && solution.dops.pdop <= most_pdop,
+        solution,
+        misfits: Vec::new(),
+        protection: None,
+    })
+}
+
+/// The same, tested by its residuals; what does not fit is taken out. Unused satellites are held
+/// against the solution.
+///
+/// # Errors
+/// As [`least_squares::solve`].
+pub(super) fn tested(
+    chosen: &Chosen,
+    model: &MeasurementModel,
+    start_ecef_m: &Vector3<f64>,
+    most_pdop: f64,
+    settings: &IntegritySettings,
+) -> Result<Fix, NavError> {
+    let assured = integrity::solve(&chosen.used, model, start_ecef_m, settings)?;
     let solution = assured.solution;
     let mut misfits = assured.misfits;
-    let agrees = if with_weak {
+    let agrees = if chosen.with_weak {
         solution.consistency == Consistency::Passed && solution.excluded.is_empty()
     } else {
         solution.consistency != Consistency::Failed
     };
     misfits.extend(integrity::misfits_among(
-        unused.iter(),
+        chosen.unused.iter(),
         model,
         &solution,
-        integrity,
+        settings,
     )?);
     Ok(Fix {
-        is_trusted: agrees && solution.dops.pdop <= settings.most_pdop,
+        is_trusted: agrees && solution.dops.pdop <= most_pdop,
         protection: assured.protection,
         solution,
         misfits,

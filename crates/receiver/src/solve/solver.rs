@@ -3,14 +3,17 @@
 use std::collections::BTreeSet;
 
 use gnss_nav::measurement::{self, Formed};
-use gnss_nav::{EphemerisStore, GpsTime, MeasurementModel, RawMeasurement, SatelliteId};
+use gnss_nav::{
+    EphemerisStore, GpsTime, Measurement, MeasurementModel, RawMeasurement, SatelliteId,
+};
 use nalgebra::Vector3;
 
 use super::kinematic::{Estimate, Kinematic};
-use super::single_point::{self, Fix};
-use super::{InjectedFault, SolveSettings, report};
+use super::particle::ParticleWatch;
+use super::single_point::{self, Chosen, Fix};
+use super::{InjectedFault, Raim, SolveSettings, report};
 use crate::ReceiverError;
-use crate::record::{Event, EventKind, PvtRecord, Record, Status};
+use crate::record::{Event, EventKind, PvtRecord, Record, ScoreRecord, Status};
 use crate::rinex_obs::{ObservedEpoch, ObservedSatellite};
 
 /// Takes a record.
@@ -33,6 +36,7 @@ pub struct Solver {
     /// Injected faults whose satellite has been observed.
     occurred: Vec<bool>,
     kinematic: Option<Kinematic>,
+    watch: Option<ParticleWatch>,
 }
 
 /// What an epoch gave.
@@ -69,19 +73,26 @@ pub struct SolveOutcome {
 
 impl Solver {
     /// With these ephemerides; `position_ecef_m` is where to begin, any place.
-    #[must_use]
+    ///
+    /// # Errors
+    /// [`ReceiverError::Monitor`] where a monitor cannot be set up.
     pub fn new(
         settings: SolveSettings,
         store: EphemerisStore,
         position_ecef_m: Vector3<f64>,
-    ) -> Self {
+    ) -> Result<Self, ReceiverError> {
         let model = MeasurementModel {
             ionosphere: settings.ionosphere,
             troposphere: settings.troposphere,
             elevation_mask_rad: settings.elevation_mask_rad,
             errors: settings.weights.errors(),
         };
-        Self {
+        let watch = match settings.raim {
+            Raim::Particle(which) => Some(ParticleWatch::new(which, settings.seed)?),
+            Raim::None | Raim::LeastSquares(_) => None,
+        };
+        Ok(Self {
+            watch,
             kinematic: settings
                 .kinematic
                 .map(|kinematic| Kinematic::new(kinematic, model)),
@@ -96,7 +107,7 @@ impl Solver {
             fixed: None,
             is_assured: None,
             counts: Counts::default(),
-        }
+        })
     }
 
     /// Takes one epoch. One that is not later than the one before is left out, and said to be.
@@ -122,13 +133,7 @@ impl Solver {
         let formed = self.form(observed.time, &raw);
         self.counts.most_observed = self.counts.most_observed.max(raw.len());
         self.counts.most_formed = self.counts.most_formed.max(formed.measurements.len());
-        let fix = single_point::solve(
-            &formed.measurements,
-            &self.model,
-            &self.position_ecef_m,
-            &self.settings,
-        )
-        .ok();
+        let fix = self.solve(time_s, &formed.measurements)?;
         if let Some(fix) = fix.as_ref().filter(|fix| fix.is_trusted) {
             self.position_ecef_m = fix.solution.position_ecef_m;
         }
@@ -146,6 +151,29 @@ impl Solver {
             pvt,
         };
         self.report(time_s, observed, &raw, &solved, sink)
+    }
+
+    /// The epoch by itself; `None` where it has no solution.
+    fn solve(
+        &mut self,
+        time_s: f64,
+        measurements: &[Measurement],
+    ) -> Result<Option<Fix>, ReceiverError> {
+        let (model, start) = (&self.model, &self.position_ecef_m);
+        let most_pdop = self.settings.most_pdop;
+        let chosen = Chosen::of(measurements, self.settings.cn0_mask_dbhz);
+        let solved = match (&self.settings.raim, &mut self.watch) {
+            (Raim::LeastSquares(settings), _) => {
+                single_point::tested(&chosen, model, start, most_pdop, settings)
+            }
+            (_, Some(watch)) => match watch.epoch(time_s, &chosen, model, start, most_pdop) {
+                Err(ReceiverError::Nav(error)) => Err(error),
+                other => return other.map(Some),
+            },
+            _ => single_point::untested(&chosen, model, start, most_pdop),
+        };
+        // What cannot be solved is no error of the run.
+        Ok(solved.ok())
     }
 
     /// Ends: how it went.
@@ -199,8 +227,10 @@ impl Solver {
         let fix = solved.fix.as_ref();
         let epoch = report::observations(time_s, observed.time, satellites, raw, fix);
         sink(Record::Observations(epoch))?;
+        let scores: Vec<ScoreRecord> = self.scores().into_iter().collect();
         for (satellite, raw) in satellites.iter().zip(raw) {
-            let channel = report::channel(time_s, satellite, raw, solved);
+            let mut channel = report::channel(time_s, satellite, raw, solved);
+            channel.scores = scores.clone();
             sink(Record::Channel(channel))?;
         }
         self.report_exclusions(time_s, fix, sink)?;
@@ -209,6 +239,17 @@ impl Solver {
             Some(pvt) => sink(Record::Pvt(pvt.clone())),
             None => Ok(()),
         }
+    }
+
+    /// What the particle filters say of the whole epoch.
+    fn scores(&self) -> Option<ScoreRecord> {
+        let watch = self.watch.as_ref()?;
+        let judged = watch.judged()?;
+        Some(ScoreRecord {
+            monitor: watch.name().to_owned(),
+            score: judged.score(),
+            threshold: judged.threshold(),
+        })
     }
 
     /// Says which satellites are left out from here on, and which no longer.
@@ -223,7 +264,8 @@ impl Solver {
         let before = std::mem::replace(&mut self.excluded, now);
         for misfit in &fix.misfits {
             if !before.contains(&misfit.satellite) {
-                let kind = report::exclusion(misfit);
+                let monitor = self.watch.as_ref().map(ParticleWatch::name);
+                let kind = report::exclusion(misfit, monitor);
                 emit(sink, time_s, Some(misfit.satellite), kind)?;
             }
         }
@@ -253,7 +295,7 @@ impl Solver {
         if let Some(kind) = kind {
             emit(sink, time_s, None, kind)?;
         }
-        if self.settings.integrity.is_none() {
+        if self.settings.raim == Raim::None {
             return Ok(());
         }
         let is_available = solved

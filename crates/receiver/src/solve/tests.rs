@@ -123,7 +123,7 @@ impl Reported {
 }
 
 fn solve(settings: SolveSettings, epochs: &[ObservedEpoch]) -> Reported {
-    let mut solver = Solver::new(settings, constellation(), Vector3::zeros());
+    let mut solver = Solver::new(settings, constellation(), Vector3::zeros()).unwrap();
     let (mut pvt, mut events) = (Vec::new(), Vec::new());
     for epoch in epochs {
         let mut sink = |record| {
