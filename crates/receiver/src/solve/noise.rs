@@ -42,7 +42,8 @@ const REFERENCE_DBHZ: f64 = 42.0;
 
 impl Weights {
     /// Errors beyond those of tracking.
-    pub(super) fn errors(self) -> ErrorModel {
+    #[must_use]
+    pub fn errors(self) -> ErrorModel {
         let multipath_zenith_m = match self {
             Self::Elevation | Self::Both => ZENITH_M,
             Self::Cn0 => 0.0,
@@ -55,7 +56,8 @@ impl Weights {
     }
 
     /// The measurement of `observed` at the epoch `time`, `time_s` after the first.
-    pub(super) fn measurement(
+    #[must_use]
+    pub fn measurement(
         self,
         observed: &ObservedSatellite,
         time: GpsTime,
