@@ -225,20 +225,87 @@ fn protection_levels_hold_and_false_alarms_are_rare() {
     }
 }
 
+#[test]
+fn noise_free_positions_are_exact() {
+    let Some(folder) = folder("rinex/03_spirent_4h_5min") else {
+        return;
+    };
+    let [x, y, z] = OUTLIERS.position_ecef_m;
+    let (obs, nav) = (
+        folder.join("none_MO.obs.gz"),
+        folder.join("Spirent_RINEX_GN.23N"),
+    );
+    let none = ["--ionosphere", "none", "--troposphere", "none"];
+    let solved = solve(&obs, &nav, &format!("0,{x},{y},{z},0,0,0"), &none).unwrap();
+    let summary = solved.summary();
+    // 49 epochs, each announcing more satellites than it holds.
+    assert_eq!(summary["fixes"], 49);
+    assert_eq!(solved.events("epoch_short").len(), 49);
+    let worst_m = summary["error"]["position_3d_max_m"].as_f64().unwrap();
+    assert!(worst_m < 0.01, "{worst_m} m");
+}
+
+#[test]
+fn the_kinematic_filter_goes_through_all_of_the_city() {
+    let Some(solved) = solve_urban(&["--elevation-mask", "5", "--filter", "ekf"]) else {
+        return;
+    };
+    let (epochs, horizontal_rms_m) = urban_errors(&solved);
+    assert_eq!(epochs, URBAN_EPOCHS);
+    assert!(horizontal_rms_m < 30.0, "{horizontal_rms_m} m");
+    let folder = folder("rinex/05_urbannav_tst_20190428").unwrap();
+    let truth = urban_points(&folder);
+    let mut beyond = 0;
+    for row in end_to_end_tests::table(&solved.text("pvt.csv")) {
+        let time_s = number(&row, "time_s");
+        let near = truth.iter().find(|(t, _)| (t - time_s).abs() < 0.1);
+        let Some((_, place)) = near else { continue };
+        let enu = Geodetic::from_ecef(place).enu_from_ecef();
+        let position = Vector3::from(["x_m", "y_m", "z_m"].map(|name| number(&row, name)));
+        let error = enu * (position - place);
+        let [e, n, u] = ["sigma_e_m", "sigma_n_m", "sigma_u_m"].map(|name| number(&row, name));
+        let normalised = (error.x / e).powi(2) + (error.y / n).powi(2) + (error.z / u).powi(2);
+        // Exceeded once in a hundred times by a chi-square variable of three degrees of freedom.
+        beyond += usize::from(normalised > 11.34);
+    }
+    // Errors last for minutes here, so that the count scatters: five times the expectation.
+    assert!(beyond * 20 <= URBAN_EPOCHS, "{beyond}");
+}
+
+#[test]
+fn particle_filters_name_the_satellite_of_a_step() {
+    for (raim, inject, sat) in [("pf", "G09:15@300", "G09"), ("pso-pf", "G28:30@300", "G28")] {
+        let more = ["--raim", raim, "--inject", inject];
+        let Some(solved) = solve_site(&SITES[0], &more) else {
+            return;
+        };
+        let excluded = solved.events("excluded");
+        assert_eq!(excluded.len(), 1, "{excluded:?}");
+        assert_eq!(excluded[0]["sat"], sat);
+        assert_eq!(excluded[0]["monitor"], raim);
+        let delay_s = excluded[0]["time_s"].as_f64().unwrap() - 300.0;
+        assert!((0.0..15.0).contains(&delay_s), "{delay_s} s");
+    }
+}
+
 /// Positions of a car among tall buildings, ECEF, by seconds after the first epoch.
-fn urban_truth(folder: &Path) -> String {
+fn urban_points(folder: &Path) -> Vec<(f64, Vector3<f64>)> {
     /// Time of week of the first epoch, s: 12:44:33.997 on a Sunday.
     const FIRST_S: f64 = 45_873.997;
     let text = std::fs::read_to_string(folder.join("groundTruth_TST.csv")).unwrap();
-    let points: Vec<(f64, Vector3<f64>)> = text
-        .lines()
+    text.lines()
         .filter(|line| !line.trim().is_empty())
         .map(|line| {
             let v: Vec<f64> = line.split(',').map(|n| n.trim().parse().unwrap()).collect();
             let place = Geodetic::from_degrees(v[2], v[3], v[4]);
             (v[1] - FIRST_S, place.to_ecef())
         })
-        .collect();
+        .collect()
+}
+
+/// The same as a truth file, with velocities by differences.
+fn urban_truth(folder: &Path) -> String {
+    let points = urban_points(folder);
     let mut truth = String::new();
     for (i, (time_s, p)) in points.iter().enumerate() {
         let (before, after) = (

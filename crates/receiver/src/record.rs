@@ -380,6 +380,13 @@ pub enum EventKind {
         /// Line of the file it begins in.
         line: u64,
     },
+    /// An epoch of a file announces satellites that it does not hold.
+    EpochShort {
+        /// Line of the file it begins in.
+        line: u64,
+        /// How many.
+        missing: usize,
+    },
     /// All pseudoranges jumped alike: the receiver's clock made a step.
     ClockStep {
         /// By how much they are longer, m.

@@ -1,4 +1,4 @@
-//! Hatanaka's compression (versions 1.0 and 3.0): lines as differences from those of the epoch before.
+//! Hatanaka's compression (`Hatanaka2008`, versions 1.0 and 3.0): lines as differences from those of the epoch before.
 //!
 //! Text is written as what changed, numbers as differences in time of up to the order an arc was
 //! begun with (`3&12345`: order 3). Only what is wanted of GPS satellites is followed.

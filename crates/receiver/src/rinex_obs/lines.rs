@@ -17,6 +17,7 @@ pub(super) struct Lines {
     reader: Box<dyn BufRead>,
     text: Vec<u8>,
     number: u64,
+    is_held: bool,
 }
 
 impl Lines {
@@ -37,6 +38,7 @@ impl Lines {
             reader,
             text: Vec::new(),
             number: 0,
+            is_held: false,
         }
     }
 
@@ -50,8 +52,16 @@ impl Lines {
         &self.text
     }
 
+    /// Lets the next [`Self::advance`] stay at the current line.
+    pub(super) fn hold(&mut self) {
+        self.is_held = true;
+    }
+
     /// Reads the next line into [`Self::current`]; false at the end.
     pub(super) fn advance(&mut self) -> io::Result<bool> {
+        if std::mem::take(&mut self.is_held) {
+            return Ok(true);
+        }
         self.text.clear();
         let read = (&mut self.reader)
             .take(LONGEST)

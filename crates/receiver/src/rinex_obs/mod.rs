@@ -51,6 +51,8 @@ pub struct ObservedEpoch {
     pub line: u64,
     /// GPS satellites with a pseudorange on L1 C/A, each once, in order.
     pub satellites: Vec<ObservedSatellite>,
+    /// Satellites of any system that the epoch announces and does not hold.
+    pub missing: usize,
 }
 
 /// Why a file cannot be read on.
@@ -134,11 +136,12 @@ impl ObservationReader {
             let head = self.head()?;
             match head.kind {
                 Kind::Observations(time) => {
-                    let satellites = self.satellites(head.count)?;
+                    let (satellites, missing) = self.satellites(head.count)?;
                     return Ok(Some(ObservedEpoch {
                         time,
                         line,
                         satellites,
+                        missing,
                     }));
                 }
                 Kind::Lines => self.header_lines(head.count)?,
@@ -180,21 +183,16 @@ impl ObservationReader {
         ))
     }
 
-    fn satellites(&mut self, count: usize) -> Result<Vec<ObservedSatellite>, Failure> {
+    /// The satellites of an epoch that announces `count`, and how many are missing.
+    fn satellites(&mut self, count: usize) -> Result<(Vec<ObservedSatellite>, usize), Failure> {
         let mut satellites = Vec::with_capacity(count.min(16));
+        let mut missing = 0;
         if self.compact.is_some() {
             self.compact_satellites(count, &mut satellites)?;
         } else if self.header.version == 2 {
             self.satellites_2(count, &mut satellites)?;
         } else {
-            for _ in 0..count {
-                self.advance()?;
-                if let Some(satellite) = self.id(self.lines.current())? {
-                    let line = self.lines.current();
-                    let fields = self.plain_fields(|place| (line, 3 + 16 * place))?;
-                    satellites.extend(observed(satellite, &fields));
-                }
-            }
+            missing = self.satellites_3(count, &mut satellites)?;
         }
         satellites.sort_unstable_by_key(|s| s.satellite);
         if let Some(pair) = satellites
@@ -204,7 +202,31 @@ impl ObservationReader {
             let what = format!("{} twice in one epoch: expected once", pair[0].satellite);
             return Err(Failure::at(&self.lines, what));
         }
-        Ok(satellites)
+        Ok((satellites, missing))
+    }
+
+    /// Version 3: a line each. Some writers announce more than they write: an epoch ends where the
+    /// next begins, or with the file.
+    fn satellites_3(
+        &mut self,
+        count: usize,
+        found: &mut Vec<ObservedSatellite>,
+    ) -> Result<usize, Failure> {
+        for index in 0..count {
+            if !self.lines.advance()? {
+                return Ok(count - index);
+            }
+            let line = self.lines.current();
+            if line.first() == Some(&b'>') {
+                self.lines.hold();
+                return Ok(count - index);
+            }
+            if let Some(satellite) = self.id(line)? {
+                let fields = self.plain_fields(|place| (line, 3 + 16 * place))?;
+                found.extend(observed(satellite, &fields));
+            }
+        }
+        Ok(0)
     }
 
     fn compact_satellites(

@@ -96,6 +96,10 @@ enum Detail<'a> {
         #[serde(skip_serializing_if = "Option::is_none")]
         residual_m: Option<f64>,
     },
+    EpochShort {
+        line: u64,
+        missing: usize,
+    },
     EpochSkipped {
         line: u64,
     },
@@ -124,6 +128,7 @@ pub const fn kind_name(kind: &EventKind) -> &'static str {
         EventKind::Readmitted => "readmitted",
         EventKind::Alarm { .. } => "alarm",
         EventKind::ModeSwitched { .. } => "mode_switched",
+        EventKind::EpochShort { .. } => "epoch_short",
         EventKind::EpochSkipped { .. } => "epoch_skipped",
         EventKind::IntegrityChanged { .. } => "integrity_changed",
         EventKind::FilterReset { .. } => "filter_reset",
@@ -191,6 +196,10 @@ fn detail(kind: &EventKind) -> Detail<'_> {
             score: *score,
             threshold: *threshold,
             residual_m: residual_m.map(|metres| rounded(metres, 3)),
+        },
+        EventKind::EpochShort { line, missing } => Detail::EpochShort {
+            line: *line,
+            missing: *missing,
         },
         EventKind::EpochSkipped { line } => Detail::EpochSkipped { line: *line },
         EventKind::IntegrityChanged { is_available } => Detail::Integrity {

@@ -129,6 +129,13 @@ impl Solver {
         }
         self.last_s = Some(time_s);
         self.counts.epochs += 1;
+        if observed.missing > 0 {
+            let kind = EventKind::EpochShort {
+                line: observed.line,
+                missing: observed.missing,
+            };
+            emit(sink, time_s, None, kind)?;
+        }
         let raw = self.measurements(observed, time_s);
         let formed = self.form(observed.time, &raw);
         self.counts.most_observed = self.counts.most_observed.max(raw.len());

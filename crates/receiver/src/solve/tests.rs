@@ -88,6 +88,7 @@ fn observe(store: &EphemerisStore, state: &NavState) -> ObservedEpoch {
     ObservedEpoch {
         time,
         line: 1,
+        missing: 0,
         satellites: satellites.collect(),
     }
 }

@@ -4,6 +4,7 @@ mod chart;
 mod page;
 mod series;
 mod sky;
+mod stanford;
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -21,6 +22,7 @@ use crate::summary::Summary;
 use crate::truth::SolutionError;
 use chart::Mark;
 use series::Series;
+use stanford::Stanford;
 
 /// Name of the file.
 pub const FILE_NAME: &str = "report.html";
@@ -40,6 +42,8 @@ pub struct Report {
     height_m: Series,
     horizontal_error_m: Series,
     vertical_error_m: Series,
+    /// Horizontal, then vertical.
+    stanford: [Stanford; 2],
 }
 
 #[derive(Debug, Default)]
@@ -66,6 +70,7 @@ impl Report {
             height_m: Series::default(),
             horizontal_error_m: Series::default(),
             vertical_error_m: Series::default(),
+            stanford: Default::default(),
         })
     }
 
@@ -85,6 +90,11 @@ impl Report {
         let p = &error.position_enu_m;
         self.horizontal_error_m.push(error.time_s, p.x.hypot(p.y));
         self.vertical_error_m.push(error.time_s, p.z);
+        if let Some([horizontal_m, vertical_m]) = error.protection_m {
+            let [horizontal, vertical] = &mut self.stanford;
+            horizontal.push(p.x.hypot(p.y), horizontal_m);
+            vertical.push(p.z, vertical_m);
+        }
     }
 
     /// Draws the page.
