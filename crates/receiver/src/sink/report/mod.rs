@@ -30,6 +30,9 @@ pub const FILE_NAME: &str = "report.html";
 /// Most events marked in the charts; a page with more is not read.
 const MOST_MARKS: usize = 60;
 
+/// Most marks with their names beside them; more would cover one another, and the table of faults has them.
+const MOST_LABELS: usize = 8;
+
 /// Collects what the page shows, in memory that does not grow with the length of the run.
 #[derive(Debug)]
 pub struct Report {
@@ -166,11 +169,16 @@ impl Report {
     }
 
     fn chart_marks(&self) -> Vec<Mark> {
+        let is_legible = self.marks.len() <= MOST_LABELS;
         self.marks
             .iter()
             .map(|(time_s, label)| Mark {
                 time_s: *time_s,
-                label: label.clone(),
+                label: if is_legible {
+                    label.clone()
+                } else {
+                    String::new()
+                },
             })
             .collect()
     }

@@ -2,14 +2,16 @@
 
 use std::fmt::Write as _;
 
-use super::chart::{round_step, ticks};
 use super::sky::Path;
 
 const SIZE: f64 = 360.0;
 const LEFT: f64 = 52.0;
 const BOTTOM: f64 = 318.0;
 const TOP: f64 = 14.0;
-const RIGHT: f64 = 346.0;
+const RIGHT: f64 = 336.0;
+
+/// Where the axes begin, m.
+const LEAST_M: f64 = 0.1;
 
 /// Errors and the levels stated for them, m.
 #[derive(Debug, Clone, Default)]
@@ -38,19 +40,26 @@ impl Stanford {
         if self.epochs == 0 {
             return None;
         }
-        let step = round_step(self.most_m.max(1e-3) / 4.0);
-        let end_m = (self.most_m / step).ceil().max(1.0) * step;
-        let x = |m: f64| LEFT + m / end_m * (RIGHT - LEFT);
-        let y = |m: f64| BOTTOM - m / end_m * (BOTTOM - TOP);
+        // Both axes are logarithmic: levels of a poor geometry reach kilometres.
+        let decades = (self.most_m.max(1.0).log10().ceil() - LEAST_M.log10()).max(1.0);
+        let share = |m: f64| (m.max(LEAST_M) / LEAST_M).log10() / decades;
+        let x = |m: f64| LEFT + share(m) * (RIGHT - LEFT);
+        let y = |m: f64| BOTTOM - share(m) * (BOTTOM - TOP);
         let mut svg =
             format!("<svg viewBox=\"0 0 {SIZE} {SIZE}\" role=\"img\" class=\"square\">\n");
-        for m in ticks([0.0, end_m], 4) {
+        for decade in 0..=decades as i32 {
+            let m = LEAST_M * 10f64.powi(decade);
             let (tx, ty) = (x(m), y(m));
+            let text = if m < 0.99 {
+                format!("{m:.1}")
+            } else {
+                format!("{m:.0}")
+            };
             let _ = writeln!(
                 svg,
                 "<line x1=\"{LEFT}\" y1=\"{ty:.1}\" x2=\"{RIGHT}\" y2=\"{ty:.1}\" class=\"grid\"/>\
-                 <text x=\"{:.1}\" y=\"{:.1}\" class=\"tick\" text-anchor=\"end\">{m}</text>\
-                 <text x=\"{tx:.1}\" y=\"{:.1}\" class=\"tick\" text-anchor=\"middle\">{m}</text>",
+                 <text x=\"{:.1}\" y=\"{:.1}\" class=\"tick\" text-anchor=\"end\">{text}</text>\
+                 <text x=\"{tx:.1}\" y=\"{:.1}\" class=\"tick\" text-anchor=\"middle\">{text}</text>",
                 LEFT - 6.0,
                 ty + 4.0,
                 BOTTOM + 15.0
