@@ -161,6 +161,13 @@ mod tests {
             "receiver acquire --input /nonexistent --format ri8 --sample-rate 4e6 --if 0",
             "receiver inspect /nonexistent",
             "receiver run --config /nonexistent.toml",
+            "receiver solve",
+            "receiver solve --obs /nonexistent",
+            "receiver solve --obs /nonexistent --nav /nonexistent",
+            "receiver solve --obs a --nav b --elevation-mask 95",
+            "receiver solve --obs a --nav b --inject G01",
+            "receiver solve --obs a --nav b --raim x",
+            "receiver solve --obs a --nav b --truth c",
         ] {
             let message = execute_words(words).0.unwrap_err();
             assert!(
@@ -180,6 +187,10 @@ mod tests {
             "--position <LAT,LON,H>",
             "seconds",
         ] {
+            assert!(help.contains(option), "{option} in {help}");
+        }
+        let help = execute_words("receiver solve --help").1;
+        for option in ["--inject <FAULT>", "[default: 10]", "pso-pf", "track.pos"] {
             assert!(help.contains(option), "{option} in {help}");
         }
         assert!(
