@@ -1,4 +1,5 @@
 //! `receiver solve` on recorded observations, against known positions and the figures of RTKLIB.
+#![allow(clippy::unwrap_used, reason = "a failure here is a failed test")]
 
 use std::ffi::OsString;
 use std::fmt::Write as _;

@@ -19,6 +19,8 @@ pub mod sigmf;
 pub mod sink;
 pub mod solve;
 pub mod summary;
+#[cfg(test)]
+mod test_data;
 pub mod truth;
 
 pub use error::ReceiverError;

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::io::{Cursor, Write as _};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use flate2::Compression;
 use flate2::write::GzEncoder;
@@ -10,21 +10,7 @@ use proptest::prelude::*;
 use rinex::prelude::{Constellation, Rinex};
 
 use super::*;
-
-// A test that checks nothing has to say so.
-#[allow(clippy::print_stdout)]
-fn data(name: &str) -> Option<PathBuf> {
-    let root = std::env::var_os("GNSS_TEST_DATA").map_or_else(
-        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"),
-        PathBuf::from,
-    );
-    let path = root.join(name);
-    if !path.exists() {
-        println!("SKIPPED: no test data {}", path.display());
-        return None;
-    }
-    Some(path)
-}
+use crate::test_data::data;
 
 fn header_line(text: &str, label: &str) -> String {
     format!("{text:60}{label}\n")
