@@ -153,17 +153,22 @@ impl Run {
     /// Rows of a CSV output file by column name.
     #[must_use]
     pub fn rows(&self, name: &str) -> Vec<BTreeMap<String, String>> {
-        let text = self.text(name);
-        let mut lines = text.lines();
-        let names: Vec<&str> = lines.next().expect("header").split(',').collect();
-        let row = |line: &str| {
-            let pairs = names.iter().zip(line.split(','));
-            pairs
-                .map(|(n, v)| ((*n).to_owned(), v.to_owned()))
-                .collect()
-        };
-        lines.map(row).collect()
+        table(&self.text(name))
     }
+}
+
+/// Rows of the text of a CSV file by column name.
+#[must_use]
+pub fn table(text: &str) -> Vec<BTreeMap<String, String>> {
+    let mut lines = text.lines();
+    let names: Vec<&str> = lines.next().expect("header").split(',').collect();
+    let row = |line: &str| {
+        let pairs = names.iter().zip(line.split(','));
+        pairs
+            .map(|(n, v)| ((*n).to_owned(), v.to_owned()))
+            .collect()
+    };
+    lines.map(row).collect()
 }
 
 /// Runs `receiver run` on a recording.

@@ -108,8 +108,8 @@ fn observe(
                 all.entry(one.satellite.prn).or_default().push(Observed {
                     time_s: epoch.time_s,
                     transmitted: epoch.time - one.pseudorange_m / SPEED_OF_LIGHT_MPS,
-                    doppler_hz: one.doppler_hz,
-                    cn0_dbhz: one.cn0_dbhz,
+                    doppler_hz: one.doppler_hz.unwrap(),
+                    cn0_dbhz: one.cn0_dbhz.unwrap(),
                 });
             }
         }

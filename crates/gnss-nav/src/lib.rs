@@ -12,6 +12,7 @@ pub mod ephemeris;
 mod error;
 pub mod filter;
 pub mod geodesy;
+pub mod integrity;
 pub mod least_squares;
 mod line_of_sight;
 mod linear;

@@ -122,8 +122,8 @@ fn join(
 
 /// Variance that tracking noise does not cover.
 ///
-/// sigma^2 = (ura_fraction URA)^2 + (ionosphere_fraction I)^2 + (troposphere_fraction T)^2
-/// plus, at low elevation, what the shape of the troposphere model is wrong by, where
+/// sigma^2 = (ura_fraction URA)^2 + (ionosphere_fraction I)^2 + (troposphere_fraction T)^2 +
+/// (multipath_zenith_m / sin elevation)^2 plus, at low elevation, what the shape of the troposphere model is wrong by, where
 /// I and T are the modelled delays: a delay that is switched off adds nothing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ErrorModel {
@@ -133,7 +133,13 @@ pub struct ErrorModel {
     pub ionosphere_fraction: f64,
     /// Part of the modelled tropospheric delay left over.
     pub troposphere_fraction: f64,
+    /// Reflections and antenna of a satellite at the zenith, m; those of low ones grow with the
+    /// inverse sine of the elevation.
+    pub multipath_zenith_m: f64,
 }
+
+/// Elevation below which [`ErrorModel::multipath_zenith_m`] grows no more, rad: 3 degrees.
+const LOWEST_ELEVATION_RAD: f64 = 0.05;
 
 impl ErrorModel {
     /// Tracking noise alone: for signals simulated with exactly the modelled delays.
@@ -141,7 +147,13 @@ impl ErrorModel {
         ura_fraction: 0.0,
         ionosphere_fraction: 0.0,
         troposphere_fraction: 0.0,
+        multipath_zenith_m: 0.0,
     };
+
+    fn multipath_variance_m2(&self, elevation_rad: f64) -> f64 {
+        let sine = elevation_rad.max(LOWEST_ELEVATION_RAD).sin();
+        (self.multipath_zenith_m / sine).powi(2)
+    }
 
     /// Variance of a modelled tropospheric delay.
     ///
@@ -162,12 +174,14 @@ impl ErrorModel {
 impl Default for ErrorModel {
     /// For real signals: the user range accuracy as broadcast (it tells satellites with poor
     /// clocks apart), half the Klobuchar delay (what it leaves, by IS-GPS-200 20.3.3.5.2.5), 5 %
-    /// of the troposphere (0.12 m at the zenith).
+    /// of the troposphere (0.12 m at the zenith). No multipath: a receiver that tracks for itself
+    /// states it with its tracking noise.
     fn default() -> Self {
         Self {
             ura_fraction: 1.0,
             ionosphere_fraction: 0.5,
             troposphere_fraction: 0.05,
+            multipath_zenith_m: 0.0,
         }
     }
 }
@@ -238,6 +252,9 @@ impl MeasurementModel {
         code_variance_m2
             + (self.errors.ura_fraction * user_range_accuracy_m).powi(2)
             + predicted.delay_variance_m2
+            + self
+                .errors
+                .multipath_variance_m2(predicted.look.elevation_rad)
     }
 
     /// This model without delays, mask and model errors: for a position not yet known.

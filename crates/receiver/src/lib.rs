@@ -12,11 +12,15 @@ pub mod pipeline;
 pub mod progress;
 pub mod record;
 pub mod rinex_nav;
+pub mod rinex_obs;
 pub mod samples;
 pub mod session;
 pub mod sigmf;
 pub mod sink;
+pub mod solve;
 pub mod summary;
+#[cfg(test)]
+mod test_data;
 pub mod truth;
 
 pub use error::ReceiverError;

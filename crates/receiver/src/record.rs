@@ -2,7 +2,7 @@
 
 use gnss_nav::{Ephemeris, GpsTime, SatelliteId};
 pub use gnss_signal::tracking::Lock;
-use nalgebra::{SMatrix, Vector3};
+use nalgebra::{Matrix3, SMatrix, Vector3};
 use num_complex::Complex64;
 
 /// One thing the pipeline reports. `time_s` counts from the first sample everywhere.
@@ -94,6 +94,8 @@ pub struct PvtRecord {
     pub source: Source,
     /// Standard deviations east, north, up, m.
     pub sigma_enu_m: [f64; 3],
+    /// Covariance of the position, ECEF, m^2.
+    pub position_covariance_ecef_m2: Matrix3<f64>,
     /// Standard deviation of the speed (3-D), m/s.
     pub sigma_velocity_mps: f64,
     /// Horizontal protection level, m.
@@ -187,15 +189,9 @@ pub struct ScoreRecord {
     pub threshold: f64,
 }
 
-/// One channel at a navigation epoch.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ChannelRecord {
-    /// Seconds since the first sample.
-    pub time_s: f64,
-    /// The satellite tracked.
-    pub satellite: SatelliteId,
-    /// C/N0, dB-Hz.
-    pub cn0_dbhz: f64,
+/// How a channel tracks its signal.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TrackingRecord {
     /// What the channel sees.
     pub lock: Lock,
     /// Who steers it.
@@ -206,6 +202,19 @@ pub struct ChannelRecord {
     pub code_error_chips: f64,
     /// Frequency error, Hz.
     pub frequency_error_hz: f64,
+}
+
+/// One channel, or one satellite observed elsewhere, at a navigation epoch.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ChannelRecord {
+    /// Seconds since the first sample.
+    pub time_s: f64,
+    /// The satellite tracked.
+    pub satellite: SatelliteId,
+    /// C/N0, dB-Hz, where it is known.
+    pub cn0_dbhz: Option<f64>,
+    /// State of the tracking; absent where observations come from elsewhere.
+    pub tracking: Option<TrackingRecord>,
     /// Pseudorange, m.
     pub pseudorange_m: Option<f64>,
     /// Range rate, m/s.
@@ -227,10 +236,10 @@ pub struct Observation {
     pub satellite: SatelliteId,
     /// Pseudorange, m.
     pub pseudorange_m: f64,
-    /// Doppler, Hz; positive when approaching.
-    pub doppler_hz: f64,
-    /// C/N0, dB-Hz.
-    pub cn0_dbhz: f64,
+    /// Doppler, Hz, where it is measured; positive when approaching.
+    pub doppler_hz: Option<f64>,
+    /// C/N0, dB-Hz, where it is known.
+    pub cn0_dbhz: Option<f64>,
     /// Carrier phase, where one is tracked.
     pub carrier_phase: Option<CarrierPhase>,
     /// Azimuth (from north through east), rad.
@@ -356,6 +365,8 @@ pub enum EventKind {
         score: f64,
         /// Its threshold.
         threshold: f64,
+        /// By how much its pseudorange is off, m, where that was found.
+        residual_m: Option<f64>,
     },
     /// A satellite was taken back into the solution, or is no longer held faulty.
     Readmitted,
@@ -368,10 +379,27 @@ pub enum EventKind {
         /// Its threshold.
         threshold: f64,
     },
+    /// Protection levels can be stated from here on, or no longer.
+    IntegrityChanged {
+        /// Whether they can.
+        is_available: bool,
+    },
     /// Another steers the channels from here on.
     ModeSwitched {
         /// Who.
         to: LoopMembership,
+    },
+    /// An epoch of a file is not later than the one before, and is left out.
+    EpochSkipped {
+        /// Line of the file it begins in.
+        line: u64,
+    },
+    /// An epoch of a file announces satellites that it does not hold.
+    EpochShort {
+        /// Line of the file it begins in.
+        line: u64,
+        /// How many.
+        missing: usize,
     },
     /// All pseudoranges jumped alike: the receiver's clock made a step.
     ClockStep {

@@ -200,27 +200,11 @@ fn klobuchar(rinex: &Rinex) -> Option<Klobuchar> {
 
 #[cfg(test)]
 mod tests {
-    use std::path::PathBuf;
-
     use proptest::prelude::*;
 
     use super::*;
     use crate::sink::navigation::accuracy_m;
-
-    // A test that checks nothing has to say so.
-    #[allow(clippy::print_stdout)]
-    fn data(name: &str) -> Option<PathBuf> {
-        let root = std::env::var_os("GNSS_TEST_DATA").map_or_else(
-            || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"),
-            PathBuf::from,
-        );
-        let path = root.join(name);
-        if !path.exists() {
-            println!("SKIPPED: no test data {}", path.display());
-            return None;
-        }
-        Some(path)
-    }
+    use crate::test_data::data;
 
     /// The numbers of every GPS entry of an uncompressed file, read by column, without the crate:
     /// satellite and 29 to 31 values of 19 characters.

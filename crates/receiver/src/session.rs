@@ -59,6 +59,7 @@ impl Session {
             directory: config.out.clone(),
             monitors: monitors(&config),
             dump_taps: config.dump_taps,
+            position_file: false,
             // Not the name of the input: a file and standard input give the same bytes.
             title: "GPS receiver run".to_owned(),
         })?;

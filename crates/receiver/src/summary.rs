@@ -457,6 +457,7 @@ mod tests {
             monitor: "svm".to_owned(),
             score: 2.0,
             threshold: 1.0,
+            residual_m: None,
         };
         for (time_s, kind) in [(22.5, excluded), (40.0, EventKind::Readmitted)] {
             builder.record(&Record::Event(Event {

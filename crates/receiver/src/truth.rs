@@ -109,6 +109,8 @@ pub struct SolutionError {
     pub position_enu_m: Vector3<f64>,
     /// Velocity error east, north, up, m/s.
     pub velocity_enu_mps: Vector3<f64>,
+    /// Horizontal and vertical protection level stated, m.
+    pub protection_m: Option<[f64; 2]>,
 }
 
 /// When a run received which signal, for counting the epochs that were due.
@@ -134,7 +136,7 @@ pub fn compare(
     mut visit: impl FnMut(&SolutionError),
 ) -> Result<Option<ErrorStatistics>, ReceiverError> {
     let names = [
-        "time_s", "x_m", "y_m", "z_m", "vx_mps", "vy_mps", "vz_mps", "status",
+        "time_s", "x_m", "y_m", "z_m", "vx_mps", "vy_mps", "vz_mps", "status", "hpl_m", "vpl_m",
     ];
     let mut statistics = Accumulator::default();
     for row in Table::open(pvt, &names)? {
@@ -155,6 +157,11 @@ pub fn compare(
             time_s,
             position_enu_m: enu * (position - true_point.position_ecef_m),
             velocity_enu_mps: enu * (velocity - true_point.velocity_ecef_mps),
+            protection_m: if row.text(8).is_empty() || row.text(9).is_empty() {
+                None
+            } else {
+                Some([row.number(8)?, row.number(9)?])
+            },
         };
         statistics.add(&error);
         visit(&error);

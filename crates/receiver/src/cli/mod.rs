@@ -3,15 +3,17 @@
 mod acquire;
 mod inspect;
 mod run;
+mod solve;
 
 use std::ffi::OsString;
 use std::io::{ErrorKind, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Parser, Subcommand};
 
 use crate::ReceiverError;
-use crate::config::{AcquireOptions, RunOptions};
+use crate::config::{AcquireOptions, RunOptions, SolveOptions};
+use crate::summary::Summary;
 
 /// GPS software receiver: samples in, positions out.
 #[derive(Debug, Parser)]
@@ -28,6 +30,9 @@ enum Command {
     Run(Box<RunOptions>),
     /// Say which satellites are at the start of a recording
     Acquire(AcquireOptions),
+    /// Positions from the observations of another receiver
+    #[command(after_help = SOLVE_NOTES)]
+    Solve(Box<SolveOptions>),
     /// Say what a recording, a result or a RINEX navigation file holds
     #[command(after_help = INSPECT_NOTES)]
     Inspect {
@@ -52,6 +57,10 @@ less than about 6 s of signal need --nav, --position and --time.
 Exit status: 0 done (also where no position was possible, which the last line says), 2 bad usage
 or input.";
 
+const SOLVE_NOTES: &str = "\
+Output files (--out): summary.json cost.json pvt.csv channels.csv events.jsonl observations.rnx
+track.pos track.kml track.nmea report.html. GPS L1 C/A; times are seconds since the first epoch.";
+
 const INSPECT_NOTES: &str = "A recording without --format and sidecar is shown as bytes.";
 
 /// Runs the command that `arguments` (program name first) ask for; what it finds goes to `out`.
@@ -70,6 +79,7 @@ pub fn execute(
     match cli.command {
         Command::Run(options) => run::run(*options, out),
         Command::Acquire(options) => acquire::acquire(&options, out),
+        Command::Solve(options) => solve::solve(&options, out),
         Command::Inspect {
             files,
             format,
@@ -98,6 +108,15 @@ fn print(out: &mut dyn Write, text: &str) -> Result<(), ReceiverError> {
     })
 }
 
+/// What is said on the screen: where the files are, what was found; the reason for no fix comes
+/// last.
+fn with_files(directory: Option<&Path>, summary: &Summary) -> String {
+    let files = directory.map_or_else(String::new, |directory| {
+        format!("{:<12}{}\n", "files", directory.display())
+    });
+    format!("{files}{summary}")
+}
+
 /// The first paragraph of what clap says, on one line.
 fn usage(error: &clap::Error) -> ReceiverError {
     let text = error.render().to_string();
@@ -109,7 +128,7 @@ fn usage(error: &clap::Error) -> ReceiverError {
     let what = paragraph.join(" ");
     let what = what.strip_prefix("error: ").unwrap_or(&what);
     let what = if what.is_empty() || what.starts_with("GPS software") {
-        "no command: expected run, acquire or inspect"
+        "no command: expected run, acquire, solve or inspect"
     } else {
         what
     };
@@ -142,6 +161,13 @@ mod tests {
             "receiver acquire --input /nonexistent --format ri8 --sample-rate 4e6 --if 0",
             "receiver inspect /nonexistent",
             "receiver run --config /nonexistent.toml",
+            "receiver solve",
+            "receiver solve --obs /nonexistent",
+            "receiver solve --obs /nonexistent --nav /nonexistent",
+            "receiver solve --obs a --nav b --elevation-mask 95",
+            "receiver solve --obs a --nav b --inject G01",
+            "receiver solve --obs a --nav b --raim x",
+            "receiver solve --obs a --nav b --truth c",
         ] {
             let message = execute_words(words).0.unwrap_err();
             assert!(
@@ -161,6 +187,10 @@ mod tests {
             "--position <LAT,LON,H>",
             "seconds",
         ] {
+            assert!(help.contains(option), "{option} in {help}");
+        }
+        let help = execute_words("receiver solve --help").1;
+        for option in ["--inject <FAULT>", "[default: 10]", "pso-pf", "track.pos"] {
             assert!(help.contains(option), "{option} in {help}");
         }
         assert!(

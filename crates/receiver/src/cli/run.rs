@@ -4,12 +4,11 @@ use std::io::Write;
 
 use gnss_signal::{IfCorrelatorBank, InstructionSet};
 
-use super::print;
+use super::{print, with_files};
 use crate::ReceiverError;
-use crate::config::{Isa, RunConfig, RunOptions};
+use crate::config::{Isa, RunOptions};
 use crate::samples;
 use crate::session::Session;
-use crate::summary::Summary;
 
 /// Samples kept, s: a channel starts at the first sample of its acquisition, so that no
 /// navigation bit is lost while the search runs.
@@ -23,7 +22,7 @@ pub(super) fn run(options: RunOptions, out: &mut dyn Write) -> Result<(), Receiv
         .with_search_threads(config.threads);
     let received = session.run(bank);
     progress.finish();
-    print(out, &text(&config, &received?))
+    print(out, &with_files(config.out.as_deref(), &received?))
 }
 
 fn instruction_set(isa: Isa) -> InstructionSet {
@@ -34,12 +33,4 @@ fn instruction_set(isa: Isa) -> InstructionSet {
         Isa::Avx2 => InstructionSet::Avx2,
         Isa::Avx512 => InstructionSet::Avx512,
     }
-}
-
-/// What is said on the screen; the reason for no fix comes last.
-fn text(config: &RunConfig, summary: &Summary) -> String {
-    let files = config.out.as_ref().map_or_else(String::new, |directory| {
-        format!("{:<12}{}\n", "files", directory.display())
-    });
-    format!("{files}{summary}")
 }

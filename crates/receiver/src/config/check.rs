@@ -49,12 +49,7 @@ pub(super) struct Checks<'a>(pub(super) &'a Origin);
 impl Checks<'_> {
     pub(super) fn run(&self, given: &RunOptions) -> Result<RunConfig, ReceiverError> {
         self.run_values(given)?;
-        if given.truth.is_some() && given.out.is_none() {
-            return Err(self.missing(
-                "out",
-                "a directory, as errors are computed from its pvt.csv",
-            ));
-        }
+        self.needs_out(given.truth.as_ref(), given.out.as_ref())?;
         Ok(RunConfig {
             recording: self.recording(&recording_options(given))?,
             nav: given.nav.clone(),
@@ -69,8 +64,8 @@ impl Checks<'_> {
             innovation_test: self.innovation_test(given)?,
             policy: self.policy(given)?,
             rate_hz: given.rate.unwrap_or(10.0),
-            ionosphere: self.ionosphere(given)?,
-            troposphere: self.troposphere(given)?,
+            ionosphere: self.ionosphere(given.ionosphere.as_deref())?,
+            troposphere: self.troposphere(given.troposphere.as_deref())?,
             elevation_mask_rad: given.elevation_mask.unwrap_or(0.0).to_radians(),
             prns: self.prns(given.prn.as_deref())?,
             truth: given.truth.clone(),
@@ -83,16 +78,36 @@ impl Checks<'_> {
         })
     }
 
+    /// Errors against a truth are computed from an output file.
+    pub(super) fn needs_out(
+        &self,
+        truth: Option<&PathBuf>,
+        out: Option<&PathBuf>,
+    ) -> Result<(), ReceiverError> {
+        if truth.is_none() || out.is_some() {
+            return Ok(());
+        }
+        Err(self.missing(
+            "out",
+            "a directory, as errors are computed from its pvt.csv",
+        ))
+    }
+
+    /// The mask in degrees, if possible.
+    pub(super) fn elevation_mask(&self, mask: Option<f64>) -> Result<Option<f64>, ReceiverError> {
+        self.number("elevation-mask", mask, "0 to 90 (degrees)", |v| {
+            (0.0..=90.0).contains(&v)
+        })?;
+        Ok(mask)
+    }
+
     /// Checks every value by itself; nothing has to be present.
     pub(super) fn run_values(&self, given: &RunOptions) -> Result<(), ReceiverError> {
         self.recording_values(&recording_options(given))?;
         self.number("rate", given.rate, "above 0 and at most 50 (Hz)", |v| {
             v > 0.0 && v <= 50.0
         })?;
-        let mask = given.elevation_mask;
-        self.number("elevation-mask", mask, "0 to 90 (degrees)", |v| {
-            (0.0..=90.0).contains(&v)
-        })?;
+        self.elevation_mask(given.elevation_mask)?;
         self.mode(given)?;
         self.filter(given)?;
         self.innovation_test(given)?;
@@ -106,8 +121,8 @@ impl Checks<'_> {
             .map(|t| self.position(t))
             .transpose()?;
         given.time.as_deref().map(|t| self.time(t)).transpose()?;
-        self.ionosphere(given)?;
-        self.troposphere(given)?;
+        self.ionosphere(given.ionosphere.as_deref())?;
+        self.troposphere(given.troposphere.as_deref())?;
         self.isa(given)?;
         self.prns(given.prn.as_deref()).map(|_| ())
     }
@@ -309,30 +324,20 @@ impl Checks<'_> {
         self.choice("policy", given.policy.as_deref(), "exclude", &policies)
     }
 
-    fn ionosphere(&self, given: &RunOptions) -> Result<Ionosphere, ReceiverError> {
+    pub(super) fn ionosphere(&self, given: Option<&str>) -> Result<Ionosphere, ReceiverError> {
         let models = [
             ("klobuchar", Ionosphere::Klobuchar),
             ("none", Ionosphere::None),
         ];
-        self.choice(
-            "ionosphere",
-            given.ionosphere.as_deref(),
-            "klobuchar",
-            &models,
-        )
+        self.choice("ionosphere", given, "klobuchar", &models)
     }
 
-    fn troposphere(&self, given: &RunOptions) -> Result<Troposphere, ReceiverError> {
+    pub(super) fn troposphere(&self, given: Option<&str>) -> Result<Troposphere, ReceiverError> {
         let models = [
             ("saastamoinen", Troposphere::Saastamoinen),
             ("none", Troposphere::None),
         ];
-        self.choice(
-            "troposphere",
-            given.troposphere.as_deref(),
-            "saastamoinen",
-            &models,
-        )
+        self.choice("troposphere", given, "saastamoinen", &models)
     }
 
     fn isa(&self, given: &RunOptions) -> Result<Isa, ReceiverError> {
@@ -353,7 +358,7 @@ impl Checks<'_> {
         })
     }
 
-    fn choice<T: Copy>(
+    pub(super) fn choice<T: Copy>(
         &self,
         option: &str,
         given: Option<&str>,
@@ -372,7 +377,7 @@ impl Checks<'_> {
         })
     }
 
-    fn number(
+    pub(super) fn number(
         &self,
         option: &str,
         value: Option<f64>,
@@ -385,13 +390,13 @@ impl Checks<'_> {
         }
     }
 
-    fn wrong(&self, option: &str, value: &str, expected: &str) -> ReceiverError {
+    pub(super) fn wrong(&self, option: &str, value: &str, expected: &str) -> ReceiverError {
         ReceiverError::Option {
             what: format!("{} is '{value}': expected {expected}", self.0.name(option)),
         }
     }
 
-    fn missing(&self, option: &str, expected: &str) -> ReceiverError {
+    pub(super) fn missing(&self, option: &str, expected: &str) -> ReceiverError {
         ReceiverError::Option {
             what: format!("{} is missing: expected {expected}", self.0.name(option)),
         }

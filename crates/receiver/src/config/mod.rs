@@ -6,6 +6,7 @@
 
 mod check;
 mod options;
+mod solve;
 #[cfg(test)]
 mod tests;
 
@@ -18,6 +19,7 @@ use gnss_signal::sample::SampleDescription;
 use crate::pipeline::{FilterKind, Policy};
 
 pub use options::{AcquireOptions, RunOptions};
+pub use solve::{SolveConfig, SolveOptions};
 
 /// Where samples come from.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -71,6 +71,7 @@ impl<B: CorrelatorBank> Run<'_, B> {
                 monitor: "residuals".to_owned(),
                 score: solution.chi_square,
                 threshold: report::residual_threshold(solution, EXCLUSION_FALSE_ALARM),
+                residual_m: None,
             };
             self.emit(now, Some(*satellite), kind)?;
         }

@@ -23,6 +23,7 @@ mod vector_members;
 mod vector_mode;
 
 pub use outcome::Outcome;
+pub(crate) use report::{filtered as filter_record, innovation, pvt as solution_record};
 pub use run::run;
 pub use settings::{Aiding, Settings};
 pub use vector::{FilterKind, MeasurementNoise, Policy, VectorSettings};

@@ -1,24 +1,25 @@
 //! Records of a navigation epoch.
 
 use gnss_nav::constants::L1_WAVELENGTH_M;
+use gnss_nav::filter::{Covariance, Innovation};
 use gnss_nav::geodesy::Geodetic;
 use gnss_nav::least_squares::Solution;
-use gnss_nav::{RawMeasurement, SatelliteId, chi_square_threshold};
+use gnss_nav::{NavState, RawMeasurement, SatelliteId, chi_square_threshold};
 use gnss_signal::tracking::{ChannelEpoch, Lock};
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 use super::navigator::{Navigated, Tracked, is_contradictory};
 use super::slot::Slot;
 use crate::record::{
     CarrierPhase, ChannelRecord, Disposition, InnovationRecord, LoopMembership, Observation,
-    ObservationEpoch, PvtRecord, Source, Status,
+    ObservationEpoch, PvtRecord, Source, Status, TrackingRecord,
 };
 
 /// The solution as a record.
-pub(super) fn pvt(time_s: f64, solution: &Solution, source: Source) -> PvtRecord {
+pub(crate) fn pvt(time_s: f64, solution: &Solution, source: Source) -> PvtRecord {
     let geodetic = Geodetic::from_ecef(&solution.position_ecef_m);
     let to_enu = geodetic.enu_from_ecef();
-    let position_covariance = solution.covariance_m2.fixed_view::<3, 3>(0, 0);
+    let position_covariance: Matrix3<f64> = solution.covariance_m2.fixed_view::<3, 3>(0, 0).into();
     let enu = to_enu * position_covariance * to_enu.transpose();
     let velocity = solution.velocity.as_ref();
     let velocity_variance = velocity.map_or(f64::INFINITY, |v| {
@@ -35,6 +36,7 @@ pub(super) fn pvt(time_s: f64, solution: &Solution, source: Source) -> PvtRecord
         pdop: solution.dops.pdop,
         source,
         sigma_enu_m: [enu[(0, 0)].sqrt(), enu[(1, 1)].sqrt(), enu[(2, 2)].sqrt()],
+        position_covariance_ecef_m2: position_covariance,
         sigma_velocity_mps: velocity_variance.sqrt(),
         horizontal_protection_m: None,
         vertical_protection_m: None,
@@ -44,6 +46,50 @@ pub(super) fn pvt(time_s: f64, solution: &Solution, source: Source) -> PvtRecord
         } else {
             Status::Fix
         },
+    }
+}
+
+/// A filter's estimate as a record; how many satellites made it, and their dilution, is for the caller
+/// to say.
+pub(crate) fn filtered(
+    time_s: f64,
+    state: &NavState,
+    covariance: &Covariance,
+    status: Status,
+) -> PvtRecord {
+    let to_enu = Geodetic::from_ecef(&state.position_ecef_m).enu_from_ecef();
+    let position_covariance = block(covariance, 0);
+    let enu = to_enu * position_covariance * to_enu.transpose();
+    PvtRecord {
+        time_s,
+        time: state.time,
+        position_ecef_m: state.position_ecef_m,
+        velocity_ecef_mps: state.velocity_ecef_mps,
+        clock_bias_m: state.clock_bias_m,
+        clock_drift_mps: state.clock_drift_mps,
+        satellites_used: 0,
+        pdop: f64::INFINITY,
+        source: Source::Filter,
+        sigma_enu_m: [enu[(0, 0)].sqrt(), enu[(1, 1)].sqrt(), enu[(2, 2)].sqrt()],
+        position_covariance_ecef_m2: position_covariance,
+        sigma_velocity_mps: block(covariance, 1).trace().sqrt(),
+        horizontal_protection_m: None,
+        vertical_protection_m: None,
+        status,
+        filter: None,
+    }
+}
+
+/// The position block (`offset` 0) or the velocity block (1) of a covariance.
+fn block(covariance: &Covariance, offset: usize) -> Matrix3<f64> {
+    Matrix3::from_fn(|row, column| covariance[(2 * row + offset, 2 * column + offset)])
+}
+
+/// An innovation of a filter as a record.
+pub(crate) fn innovation(innovation: &Innovation) -> InnovationRecord {
+    InnovationRecord {
+        value: innovation.value(),
+        sigma: innovation.variance().sqrt(),
     }
 }
 
@@ -88,8 +134,8 @@ pub(super) fn observation(
     Observation {
         satellite: slot.satellite,
         pseudorange_m: raw.pseudorange_m,
-        doppler_hz: epoch.doppler_hz,
-        cn0_dbhz: epoch.cn0_dbhz,
+        doppler_hz: Some(epoch.doppler_hz),
+        cn0_dbhz: Some(epoch.cn0_dbhz),
         carrier_phase: (epoch.lock == Lock::Carrier).then_some(CarrierPhase {
             cycles: phase,
             loss_of_lock: epoch.phase_slipped,
@@ -97,6 +143,17 @@ pub(super) fn observation(
         }),
         azimuth_rad: sight.map(|s| s.0),
         elevation_rad: sight.map(|s| s.1),
+    }
+}
+
+/// How a channel tracks.
+pub(super) const fn tracking(epoch: &ChannelEpoch, membership: LoopMembership) -> TrackingRecord {
+    TrackingRecord {
+        lock: epoch.lock,
+        membership,
+        prompt: epoch.prompt,
+        code_error_chips: epoch.code_error_chips,
+        frequency_error_hz: epoch.frequency_error_hz,
     }
 }
 
@@ -109,12 +166,8 @@ pub(super) fn channel(time_s: f64, tracked: &Tracked, navigated: &Navigated) -> 
     ChannelRecord {
         time_s,
         satellite,
-        cn0_dbhz: epoch.cn0_dbhz,
-        lock: epoch.lock,
-        membership: LoopMembership::Scalar,
-        prompt: epoch.prompt,
-        code_error_chips: epoch.code_error_chips,
-        frequency_error_hz: epoch.frequency_error_hz,
+        cn0_dbhz: Some(epoch.cn0_dbhz),
+        tracking: Some(tracking(epoch, LoopMembership::Scalar)),
         pseudorange_m: raw.map(|r| r.pseudorange_m),
         range_rate_mps: raw.map(|r| r.range_rate_mps),
         innovation_code_m,

@@ -41,19 +41,20 @@ impl ChannelsCsv {
     }
 
     fn channel(&mut self, channel: &ChannelRecord) -> Result<(), ReceiverError> {
+        let tracking = channel.tracking;
         write!(
             self.file,
             "{},{},{},{},{},{},{},{},{},{},",
             Fixed(channel.time_s, 6),
             channel.satellite,
             channel.satellite.prn,
-            Fixed(channel.cn0_dbhz, 3),
-            channel.lock.name(),
-            channel.membership.name(),
-            Fixed(channel.prompt.re, 4),
-            Fixed(channel.prompt.im, 4),
-            Fixed(channel.code_error_chips, 6),
-            Fixed(channel.frequency_error_hz, 4),
+            optional(channel.cn0_dbhz, 3),
+            tracking.map_or("", |t| t.lock.name()),
+            tracking.map_or("", |t| t.membership.name()),
+            optional(tracking.map(|t| t.prompt.re), 4),
+            optional(tracking.map(|t| t.prompt.im), 4),
+            optional(tracking.map(|t| t.code_error_chips), 6),
+            optional(tracking.map(|t| t.frequency_error_hz), 4),
         )?;
         let (code, rate) = (channel.innovation_code_m, channel.innovation_rate_mps);
         write!(

@@ -93,6 +93,18 @@ enum Detail<'a> {
         monitor: &'a str,
         score: f64,
         threshold: f64,
+        #[serde(skip_serializing_if = "Option::is_none")]
+        residual_m: Option<f64>,
+    },
+    EpochShort {
+        line: u64,
+        missing: usize,
+    },
+    EpochSkipped {
+        line: u64,
+    },
+    Integrity {
+        to: &'static str,
     },
     Nothing {},
 }
@@ -116,6 +128,9 @@ pub const fn kind_name(kind: &EventKind) -> &'static str {
         EventKind::Readmitted => "readmitted",
         EventKind::Alarm { .. } => "alarm",
         EventKind::ModeSwitched { .. } => "mode_switched",
+        EventKind::EpochShort { .. } => "epoch_short",
+        EventKind::EpochSkipped { .. } => "epoch_skipped",
+        EventKind::IntegrityChanged { .. } => "integrity_changed",
         EventKind::FilterReset { .. } => "filter_reset",
         EventKind::ClockStep { .. } => "clock_step",
     }
@@ -165,15 +180,34 @@ fn detail(kind: &EventKind) -> Detail<'_> {
             monitor,
             score,
             threshold,
-        }
-        | EventKind::Excluded {
-            monitor,
-            score,
-            threshold,
         } => Detail::Alarm {
             monitor,
             score: *score,
             threshold: *threshold,
+            residual_m: None,
+        },
+        EventKind::Excluded {
+            monitor,
+            score,
+            threshold,
+            residual_m,
+        } => Detail::Alarm {
+            monitor,
+            score: *score,
+            threshold: *threshold,
+            residual_m: residual_m.map(|metres| rounded(metres, 3)),
+        },
+        EventKind::EpochShort { line, missing } => Detail::EpochShort {
+            line: *line,
+            missing: *missing,
+        },
+        EventKind::EpochSkipped { line } => Detail::EpochSkipped { line: *line },
+        EventKind::IntegrityChanged { is_available } => Detail::Integrity {
+            to: if *is_available {
+                "available"
+            } else {
+                "unavailable"
+            },
         },
         EventKind::BitSync
         | EventKind::SpectrumInverted

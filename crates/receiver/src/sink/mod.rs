@@ -9,6 +9,7 @@ pub mod navigation;
 pub mod nmea;
 pub mod observations;
 pub mod outputs;
+pub mod position;
 pub mod pvt;
 pub mod report;
 mod rinex_header;

@@ -198,7 +198,7 @@ fn gsv(sky: &[Observation]) -> Vec<String> {
             o.satellite.prn,
             field(o.elevation_rad.map(f64::to_degrees), 2),
             field(o.azimuth_rad.map(|a| a.to_degrees().rem_euclid(360.0)), 3),
-            field(Some(o.cn0_dbhz), 2)
+            field(o.cn0_dbhz, 2)
         )
     };
     groups

@@ -141,7 +141,14 @@ fn position_line(ecef_m: &Vector3<f64>) -> String {
 }
 
 fn line(observation: &Observation) -> String {
-    let strength = signal_strength(observation.cn0_dbhz);
+    // The indicator is blank where the strength is unknown, and where there is nothing it speaks of.
+    let strength = observation
+        .cn0_dbhz
+        .map_or_else(|| " ".to_owned(), |cn0| signal_strength(cn0).to_string());
+    let doppler = observation.doppler_hz.map_or_else(
+        || " ".repeat(16),
+        |doppler_hz| format!("{} {strength}", value(doppler_hz)),
+    );
     let phase = observation.carrier_phase.map_or_else(
         || " ".repeat(16),
         |phase| {
@@ -156,11 +163,10 @@ fn line(observation: &Observation) -> String {
         },
     );
     let text = format!(
-        "{}{} {strength}{phase}{} {strength}{}",
+        "{}{} {strength}{phase}{doppler}{}",
         observation.satellite,
         value(observation.pseudorange_m),
-        value(observation.doppler_hz),
-        value(observation.cn0_dbhz),
+        value(observation.cn0_dbhz.unwrap_or(f64::NAN)),
     );
     text.trim_end().to_owned()
 }

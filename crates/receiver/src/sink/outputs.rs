@@ -12,6 +12,7 @@ use super::kml::TrackKml;
 use super::navigation::NavigationRinex;
 use super::nmea::TrackNmea;
 use super::observations::ObservationsRinex;
+use super::position::PositionFile;
 use super::pvt::{self, PvtCsv};
 use super::report::Report;
 use super::taps::TapsCsv;
@@ -30,6 +31,8 @@ pub struct OutputSettings {
     pub monitors: Vec<String>,
     /// Whether `taps.csv` is written.
     pub dump_taps: bool,
+    /// Whether `track.pos` is written.
+    pub position_file: bool,
     /// Title of the report.
     pub title: String,
 }
@@ -82,6 +85,11 @@ impl Outputs {
             Box::new(TrackKml::create(directory)?),
             Box::new(TrackNmea::create(directory)?),
         ];
+        if settings.position_file {
+            outputs
+                .sinks
+                .push(Box::new(PositionFile::create(directory)?));
+        }
         if settings.dump_taps {
             outputs.sinks.push(Box::new(TapsCsv::create(directory)?));
         }

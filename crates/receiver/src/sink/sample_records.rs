@@ -1,12 +1,12 @@
 //! Records for the tests of the writers.
 
 use gnss_nav::{Ephemeris, GpsTime, SatelliteId};
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 use num_complex::Complex64;
 
 use crate::record::{
     CarrierPhase, ChannelRecord, Disposition, Lock, LoopMembership, Observation, ObservationEpoch,
-    PvtRecord, Source, Status,
+    PvtRecord, Source, Status, TrackingRecord,
 };
 use gnss_nav::geodesy::Geodetic;
 
@@ -31,6 +31,7 @@ pub(crate) fn pvt(time_s: f64) -> PvtRecord {
         pdop: 1.9,
         source: Source::LeastSquares,
         sigma_enu_m: [0.5, 0.6, 1.1],
+        position_covariance_ecef_m2: Matrix3::identity(),
         sigma_velocity_mps: 0.05,
         horizontal_protection_m: None,
         vertical_protection_m: None,
@@ -43,12 +44,14 @@ pub(crate) fn channel(time_s: f64, prn: u8) -> ChannelRecord {
     ChannelRecord {
         time_s,
         satellite: SatelliteId::gps(prn),
-        cn0_dbhz: 44.5,
-        lock: Lock::Carrier,
-        membership: LoopMembership::Scalar,
-        prompt: Complex64::new(12.5, -0.25),
-        code_error_chips: 0.001,
-        frequency_error_hz: -0.5,
+        cn0_dbhz: Some(44.5),
+        tracking: Some(TrackingRecord {
+            lock: Lock::Carrier,
+            membership: LoopMembership::Scalar,
+            prompt: Complex64::new(12.5, -0.25),
+            code_error_chips: 0.001,
+            frequency_error_hz: -0.5,
+        }),
         pseudorange_m: Some(21_000_000.125),
         range_rate_mps: Some(-321.5),
         innovation_code_m: None,
@@ -62,8 +65,8 @@ pub(crate) fn observation(prn: u8, azimuth_deg: f64, elevation_deg: f64) -> Obse
     Observation {
         satellite: SatelliteId::gps(prn),
         pseudorange_m: 21_000_000.125,
-        doppler_hz: 1690.0,
-        cn0_dbhz: 44.5,
+        doppler_hz: Some(1690.0),
+        cn0_dbhz: Some(44.5),
         carrier_phase: Some(CarrierPhase {
             cycles: 1234.567,
             loss_of_lock: true,

@@ -1,7 +1,8 @@
-//! `Wang2016`: integrity monitoring by particle filters moved by a swarm, on simulated data.
+//! `Wang2016`: integrity monitoring by particle filters moved by a swarm, on simulated and on real
+//! data.
 //!
-//! Everything that judges takes [`fault_ml::Sight`]s: real observations will only need another
-//! source of them beside [`setting`].
+//! Everything that judges takes [`fault_ml::Sight`]s: made up in [`setting`], of recorded observations
+//! in [`real`].
 
 pub mod calibrated;
 pub mod checks;
@@ -9,6 +10,7 @@ pub mod detector;
 mod explain;
 pub mod figures;
 pub mod performance;
+pub mod real;
 pub mod report;
 pub mod setting;
 pub mod simulate;
@@ -20,10 +22,11 @@ use anyhow::Result;
 
 use self::calibrated::Calibrated;
 use self::figures::Shown;
+use self::real::RealStudy;
 use self::study::{Study, case};
 use super::Outcome;
 
-/// Repeats the paper on simulated data.
+/// Repeats the paper on simulated data, and on a recording where it is present.
 ///
 /// # Errors
 /// Where a campaign or a picture cannot be made.
@@ -31,7 +34,9 @@ pub fn reproduce() -> Result<Outcome> {
     let geometry = setting::geometry()?;
     let study = Study::run(&geometry)?;
     let calibrated = Calibrated::run(&geometry)?;
-    let checks = checks::checks(&study, &calibrated)?;
+    let real = RealStudy::run()?;
+    let mut checks = checks::checks(&study, &calibrated)?;
+    checks.extend(real.iter().flat_map(checks::on_real_data));
     let shown = case(&study.paper, "pf")?.campaign;
     let shown = Shown {
         geometry: &geometry,
@@ -42,8 +47,8 @@ pub fn reproduce() -> Result<Outcome> {
     };
     Ok(Outcome {
         paper: "wang2016",
-        figures: report::figures(&study, &calibrated),
-        report: report::report(&study, &calibrated, &checks)?,
+        figures: report::figures(&study, &calibrated, real.as_ref()),
+        report: report::report(&study, &calibrated, real.as_ref(), &checks)?,
         pictures: shown.pictures()?,
         tables: Vec::new(),
         checks,

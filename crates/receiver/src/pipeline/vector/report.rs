@@ -1,18 +1,16 @@
 //! Records of vector tracking.
 
-use gnss_nav::filter::{Covariance, Disposition, Innovation};
-use gnss_nav::geodesy::Geodetic;
+use gnss_nav::filter::Disposition;
 use gnss_nav::{GpsTime, SatelliteId};
 use gnss_signal::tracking::Lock;
-use nalgebra::Matrix3;
 
 use super::watch::{Change, Watch};
 use super::{Epoch, Member, Policy, VectorTracking};
-use crate::pipeline::report::observation;
+use crate::pipeline::report::{filtered, innovation, observation, tracking};
 use crate::pipeline::slot::Slot;
 use crate::record::{
-    self, ChannelRecord, EventKind, FilterRecord, InnovationRecord, LoopMembership,
-    ObservationEpoch, PvtRecord, ScoreRecord, Source, Status,
+    self, ChannelRecord, EventKind, FilterRecord, LoopMembership, ObservationEpoch, PvtRecord,
+    ScoreRecord, Status,
 };
 
 /// Says what changed in the belief in a satellite.
@@ -31,6 +29,7 @@ pub(super) fn change(
                     monitor,
                     score,
                     threshold,
+                    residual_m: None,
                 }
             } else {
                 EventKind::Alarm {
@@ -48,35 +47,22 @@ pub(super) fn change(
 impl VectorTracking {
     /// The estimate as a record.
     pub(in crate::pipeline) fn pvt(&self, time_s: f64, epoch: &Epoch) -> PvtRecord {
-        let state = self.state();
         let own = self.filter.covariance_after(epoch.age_s());
         let covariance = self.geometry.map_or(own, |g| g.with_lasting(&own));
-        let to_enu = Geodetic::from_ecef(&state.position_ecef_m).enu_from_ecef();
-        let enu = to_enu * block(&covariance, 0) * to_enu.transpose();
+        let status = if self.is_fixed() {
+            Status::Fix
+        } else {
+            Status::Predicted
+        };
         PvtRecord {
-            time_s,
-            time: state.time,
-            position_ecef_m: state.position_ecef_m,
-            velocity_ecef_mps: state.velocity_ecef_mps,
-            clock_bias_m: state.clock_bias_m,
-            clock_drift_mps: state.clock_drift_mps,
             satellites_used: epoch.members.iter().filter(|m| m.used).count(),
             pdop: self.geometry.map_or(f64::INFINITY, |g| g.pdop),
-            source: Source::Filter,
-            sigma_enu_m: [enu[(0, 0)].sqrt(), enu[(1, 1)].sqrt(), enu[(2, 2)].sqrt()],
-            sigma_velocity_mps: block(&covariance, 1).trace().sqrt(),
-            horizontal_protection_m: None,
-            vertical_protection_m: None,
-            status: if self.is_fixed() {
-                Status::Fix
-            } else {
-                Status::Predicted
-            },
             filter: Some(FilterRecord {
                 covariance: own,
                 normalised_innovation_squared: epoch.normalised_innovation_squared,
                 innovations: epoch.innovations_used,
             }),
+            ..filtered(time_s, self.state(), &covariance, status)
         }
     }
 
@@ -90,12 +76,8 @@ impl VectorTracking {
         ChannelRecord {
             time_s,
             satellite: member.satellite,
-            cn0_dbhz: epoch.cn0_dbhz,
-            lock: epoch.lock,
-            membership: LoopMembership::Vector,
-            prompt: epoch.prompt,
-            code_error_chips: epoch.code_error_chips,
-            frequency_error_hz: epoch.frequency_error_hz,
+            cn0_dbhz: Some(epoch.cn0_dbhz),
+            tracking: Some(tracking(epoch, LoopMembership::Vector)),
             pseudorange_m: member.raw.map(|r| r.pseudorange_m),
             range_rate_mps: member.raw.map(|r| r.range_rate_mps),
             innovation_code_m: code,
@@ -135,13 +117,6 @@ fn score(watch: &Watch) -> Option<ScoreRecord> {
     })
 }
 
-fn innovation(innovation: &Innovation) -> InnovationRecord {
-    InnovationRecord {
-        value: innovation.value(),
-        sigma: innovation.variance().sqrt(),
-    }
-}
-
 const fn disposition(told: Option<Disposition>) -> record::Disposition {
     match told {
         None => record::Disposition::Unavailable,
@@ -151,9 +126,4 @@ const fn disposition(told: Option<Disposition>) -> record::Disposition {
         }
         Some(Disposition::Exclude) => record::Disposition::Exclude,
     }
-}
-
-/// The position block (`offset` 0) or the velocity block (1) of a covariance.
-fn block(covariance: &Covariance, offset: usize) -> Matrix3<f64> {
-    Matrix3::from_fn(|row, column| covariance[(2 * row + offset, 2 * column + offset)])
 }

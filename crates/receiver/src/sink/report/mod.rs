@@ -4,6 +4,7 @@ mod chart;
 mod page;
 mod series;
 mod sky;
+mod stanford;
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -21,12 +22,16 @@ use crate::summary::Summary;
 use crate::truth::SolutionError;
 use chart::Mark;
 use series::Series;
+use stanford::Stanford;
 
 /// Name of the file.
 pub const FILE_NAME: &str = "report.html";
 
 /// Most events marked in the charts; a page with more is not read.
 const MOST_MARKS: usize = 60;
+
+/// Most marks with their names beside them; more would cover one another, and the table of faults has them.
+const MOST_LABELS: usize = 8;
 
 /// Collects what the page shows, in memory that does not grow with the length of the run.
 #[derive(Debug)]
@@ -40,6 +45,8 @@ pub struct Report {
     height_m: Series,
     horizontal_error_m: Series,
     vertical_error_m: Series,
+    /// Horizontal, then vertical.
+    stanford: [Stanford; 2],
 }
 
 #[derive(Debug, Default)]
@@ -66,6 +73,7 @@ impl Report {
             height_m: Series::default(),
             horizontal_error_m: Series::default(),
             vertical_error_m: Series::default(),
+            stanford: Default::default(),
         })
     }
 
@@ -85,6 +93,11 @@ impl Report {
         let p = &error.position_enu_m;
         self.horizontal_error_m.push(error.time_s, p.x.hypot(p.y));
         self.vertical_error_m.push(error.time_s, p.z);
+        if let Some([horizontal_m, vertical_m]) = error.protection_m {
+            let [horizontal, vertical] = &mut self.stanford;
+            horizontal.push(p.x.hypot(p.y), horizontal_m);
+            vertical.push(p.z, vertical_m);
+        }
     }
 
     /// Draws the page.
@@ -99,7 +112,9 @@ impl Report {
 
     fn channel(&mut self, channel: &ChannelRecord) {
         let history = self.satellites.entry(channel.satellite).or_default();
-        history.cn0_dbhz.push(channel.time_s, channel.cn0_dbhz);
+        if let Some(cn0_dbhz) = channel.cn0_dbhz {
+            history.cn0_dbhz.push(channel.time_s, cn0_dbhz);
+        }
         if let Some(InnovationRecord { value, sigma }) = channel.innovation_code_m {
             history.innovation.push(channel.time_s, value / sigma);
         }
@@ -154,11 +169,16 @@ impl Report {
     }
 
     fn chart_marks(&self) -> Vec<Mark> {
+        let is_legible = self.marks.len() <= MOST_LABELS;
         self.marks
             .iter()
             .map(|(time_s, label)| Mark {
                 time_s: *time_s,
-                label: label.clone(),
+                label: if is_legible {
+                    label.clone()
+                } else {
+                    String::new()
+                },
             })
             .collect()
     }

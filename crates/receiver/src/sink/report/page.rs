@@ -60,11 +60,18 @@ pub(super) fn page(report: &Report, summary: &Summary) -> String {
     html += &card("Positions, from the first one", ground_plot(&report.track));
     html += "</div>\n";
     html += &card("Position error", position_error(report, &marks));
+    html += "<div class=\"pair\">\n";
+    let [horizontal, vertical] = &report.stanford;
+    html += &card("Horizontal protection", horizontal.svg("horizontal"));
+    html += &card("Vertical protection", vertical.svg("vertical"));
+    html += "</div>\n";
     html += &card("C/N0", cn0(report, &marks));
     html += &card("Code innovations", innovations(report, &marks));
     html += &card("Height above the ellipsoid", height(report, &marks));
     html += &card("Faults", faults(summary));
-    html += &card("Satellites acquired", Some(satellites(summary)));
+    if is_of_signals(summary) {
+        html += &card("Satellites acquired", Some(satellites(summary)));
+    }
     html + "</main></body></html>\n"
 }
 
@@ -75,15 +82,19 @@ fn subtitle(summary: &Summary) -> String {
     format!("{:.3} s of signal{time}", summary.signal_s)
 }
 
+/// Whether signals were received: a position from another receiver's observations acquires none.
+fn is_of_signals(summary: &Summary) -> bool {
+    !summary.acquired.is_empty() || summary.fixes == 0
+}
+
 fn tiles(summary: &Summary) -> String {
-    let mut all = vec![
-        (summary.acquired.len().to_string(), "satellites acquired"),
-        (
-            summary.ephemerides_decoded.len().to_string(),
-            "ephemerides decoded",
-        ),
-        (summary.fixes.to_string(), "fixes"),
-    ];
+    let mut all = Vec::new();
+    if is_of_signals(summary) {
+        all.push((summary.acquired.len().to_string(), "satellites acquired"));
+        let decoded = summary.ephemerides_decoded.len().to_string();
+        all.push((decoded, "ephemerides decoded"));
+    }
+    all.push((summary.fixes.to_string(), "fixes"));
     if let Some(first_s) = summary.first_fix_s {
         all.push((format!("{first_s:.2} s"), "to the first fix"));
     }
