@@ -262,7 +262,8 @@ fn mean_cn0_dbhz(judged: &Judged, satellite: SatelliteId) -> Option<f64> {
         .channels
         .iter()
         .filter(|c| c.satellite == satellite && (c.time_s - INSTANT_S).abs() < ABOUT_S);
-    let (sum, count) = about.fold((0.0, 0.0), |(sum, n), c| (sum + c.cn0_dbhz, n + 1.0));
+    let levels = about.filter_map(|channel| channel.cn0_dbhz);
+    let (sum, count) = levels.fold((0.0, 0.0), |(sum, n), level| (sum + level, n + 1.0));
     (count > 0.0).then_some(sum / count)
 }
 
