@@ -105,7 +105,7 @@ pub struct PvtRecord {
     /// How far it can be relied on.
     pub status: Status,
     /// What a navigation filter says of its own estimate.
-    pub filter: Option<FilterRecord>,
+    pub filter: Option<Box<FilterRecord>>,
 }
 
 /// A navigation filter's own view of an epoch.

@@ -154,7 +154,7 @@ fn run(form: Form, seed: u64) -> Result<Vec<Epoch>> {
         .filter(|e| e.pvt.source == Source::Filter);
     by_filter
         .map(|epoch| {
-            let filter = epoch.pvt.filter.context("a filter's record")?;
+            let filter = epoch.pvt.filter.as_ref().context("a filter's record")?;
             let (position, velocity) = (epoch.position_ecef_m(), epoch.velocity_ecef_mps());
             let elapsed_s = scenario.elapsed_s(epoch.pvt.time_s);
             let bias_m = |elapsed_s| scenario.truth.clock.metres_at(elapsed_s).0;
@@ -175,7 +175,7 @@ fn run(form: Form, seed: u64) -> Result<Vec<Epoch>> {
                 SPEED_OF_LIGHT_MPS * late_s,
                 epoch.pvt.clock_drift_mps - drift_mps,
             ]);
-            epoch_of(&filter, &error)
+            epoch_of(filter, &error)
         })
         .collect()
 }

@@ -44,7 +44,7 @@ impl Start {
         let mut random = ChaCha8Rng::seed_from_u64(number as u64);
         let tow_s = 345_600.0 + random.random_range(0.0..86_400.0);
         Ok(Self {
-            name: if number % 2 == 0 {
+            name: if number.is_multiple_of(2) {
                 "static-open-sky"
             } else {
                 "vehicle-turns"
@@ -124,9 +124,9 @@ impl Outcome {
                 })
         };
         let fallen_back = switch(LoopMembership::Scalar).count();
-        let back_s = switch(LoopMembership::Scalar).last().unwrap_or(-1.0);
+        let back_s = switch(LoopMembership::Scalar).next_back().unwrap_or(-1.0);
         let switched_s = switch(LoopMembership::Vector)
-            .last()
+            .next_back()
             .filter(|s| *s > back_s);
         let since = judged.between(switched_s.unwrap_or(RUN_S), f64::INFINITY);
         Self {

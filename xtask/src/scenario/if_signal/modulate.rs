@@ -180,7 +180,7 @@ impl<'a> Steady<'a> {
     /// A ray whose samples are so many half ticks apart.
     fn new(segment: &'a Segment, ray: &'a UniformRay, halves: i64) -> Self {
         let step = halves as u64 * ray.half_step;
-        let ahead = |sample: usize| (sample as u64 * step >> LANE_SHIFT) as u32;
+        let ahead = |sample: usize| ((sample as u64 * step) >> LANE_SHIFT) as u32;
         Self {
             segment,
             ray,

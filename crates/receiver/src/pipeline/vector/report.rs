@@ -57,11 +57,11 @@ impl VectorTracking {
         PvtRecord {
             satellites_used: epoch.members.iter().filter(|m| m.used).count(),
             pdop: self.geometry.map_or(f64::INFINITY, |g| g.pdop),
-            filter: Some(FilterRecord {
+            filter: Some(Box::new(FilterRecord {
                 covariance: own,
                 normalised_innovation_squared: epoch.normalised_innovation_squared,
                 innovations: epoch.innovations_used,
-            }),
+            })),
             ..filtered(time_s, self.state(), &covariance, status)
         }
     }
