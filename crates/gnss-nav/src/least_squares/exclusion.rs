@@ -9,12 +9,15 @@ use crate::measurement::{Measurement, MeasurementModel};
 
 /// With fewer satellites a fault shows but cannot be told apart.
 const IDENTIFIABLE: usize = 6;
+/// Redundant satellites that are left after more than one is taken out: with a single one, some set passes
+/// by chance.
+const LEFT_AFTER_SEVERAL: usize = 2;
 
 /// Solves one epoch and takes out satellites until the residuals pass.
 ///
 /// The chi-square of the pseudorange residuals is tested at `false_alarm_probability`. Where it
 /// fails with six satellites or more, the one without which the chi-square is least is taken out,
-/// repeatedly. If that never passes, the solution of all satellites comes back, marked
+/// repeatedly. If that never passes, or not with two redundant satellites left of several taken out, the solution of all satellites comes back, marked
 /// [`Consistency::Failed`].
 ///
 /// # Errors
@@ -38,7 +41,8 @@ pub fn solve_with_exclusion(
         current = best;
         current.consistency = test(&current, false_alarm_probability)?;
     }
-    if current.consistency == Consistency::Failed {
+    let few = excluded.len() > 1 && current.degrees_of_freedom() < LEFT_AFTER_SEVERAL;
+    if few || current.consistency == Consistency::Failed {
         return Ok(all);
     }
     current.excluded = excluded;

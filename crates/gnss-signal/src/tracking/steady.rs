@@ -76,7 +76,12 @@ struct Bit {
 struct Fade {
     since_tick: u64,
     integrations: u32,
+    /// Whether the last of them held noise alone.
+    is_silent: bool,
 }
+
+/// A strong signal below this ratio in an integration is not there: what is left is noise.
+const SILENT_SNR: f64 = 4.0;
 
 /// After so many a steered channel takes its signal for gone, without waiting for the smoothed C/N0
 /// to fall. By chance so many happen once in 1e11.
@@ -255,7 +260,10 @@ impl Steady {
                 code_error_chips: code_error,
                 frequency_error_hz: frequency_error,
             });
-            self.steer_by_loops(phase_error, frequency_error, code_error, interval_s);
+            // Noise alone would carry the oscillators away from where the signal may return.
+            if !self.fade.is_silent {
+                self.steer_by_loops(phase_error, frequency_error, code_error, interval_s);
+            }
         }
         self.sum_bit(taps.prompt, periods)
     }
@@ -334,14 +342,17 @@ impl Steady {
     /// Where the signal stands well out of the noise, a quarter of its power is no accident.
     fn watch_fade(&mut self, now_hz: f64, tick: u64) {
         let faded = self.is_strong() && now_hz < 0.25 * self.cn0_hz;
+        let is_silent = now_hz * self.interval_s() < SILENT_SNR;
         self.fade = match (faded, self.fade.integrations) {
             (false, _) => Fade::default(),
             (true, 0) => Fade {
                 since_tick: tick,
                 integrations: 1,
+                is_silent,
             },
             (true, n) => Fade {
                 integrations: n + 1,
+                is_silent,
                 ..self.fade
             },
         };
