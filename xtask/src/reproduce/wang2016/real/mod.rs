@@ -2,6 +2,8 @@
 
 pub mod detector;
 pub mod record;
+#[cfg(test)]
+mod tests;
 
 use anyhow::{Context, Result};
 use fault_ml::particle::{Calibration, Movement, ParticleParameters};
