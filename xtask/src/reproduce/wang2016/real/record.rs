@@ -74,6 +74,16 @@ impl Record {
         })
     }
 
+    /// The same with the deviation `sigma_m` for every satellite.
+    #[must_use]
+    pub fn with_sigma(&self, sigma_m: f64) -> Self {
+        let mut told = self.clone();
+        for sight in told.epochs.iter_mut().flatten() {
+            sight.sigma_m = sigma_m;
+        }
+        told
+    }
+
     /// Satellites.
     #[must_use]
     pub fn satellites(&self) -> usize {
