@@ -205,6 +205,11 @@ impl Steady {
         (self.fade.integrations > 0).then_some(self.fade.since_tick)
     }
 
+    /// Whether a strong signal has given way to noise: once is chance.
+    pub(super) const fn is_silent(&self) -> bool {
+        self.fade.is_silent && self.fade.integrations > 1
+    }
+
     /// Next interval: up to a bit boundary or a whole integration after one.
     pub(super) fn replica(&self) -> Replica {
         let length = i64::from(self.integration_periods());

@@ -390,8 +390,7 @@ impl Navigator {
         let raw: Vec<_> = tracked
             .iter()
             .filter(|t| matches!(t.epoch.lock, Lock::Code | Lock::Carrier))
-            // Locks and C/N0 remember a signal for a second after it has gone.
-            .filter(|t| t.slot.channel.faded_since().is_none())
+            .filter(|t| !t.slot.channel.is_silent())
             .filter_map(|t| {
                 let transmit_time = self.transmit_time(&clock, tick, t)?;
                 Some(raw_measurement(

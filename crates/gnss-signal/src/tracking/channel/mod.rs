@@ -233,6 +233,13 @@ impl Channel {
         }
     }
 
+    /// Whether a signal that was strong has just given way to noise: lock and C/N0 remember it for a second,
+    /// but nothing is measured of it.
+    #[must_use]
+    pub fn is_silent(&self) -> bool {
+        matches!(&self.stage, Stage::Steady(s) if s.is_silent())
+    }
+
     /// The next correlation; `None` once the signal is lost.
     #[must_use]
     pub fn replica(&self) -> Option<Replica> {
