@@ -5,6 +5,7 @@ pub mod jiang2017;
 mod outcome;
 pub mod report;
 pub mod wang2016;
+pub mod zhu2020;
 
 use std::path::Path;
 
@@ -49,10 +50,11 @@ pub fn reproduce(paper: Paper, making: Making, out: &Path) -> Result<Outcome> {
     let outcome = match paper {
         Paper::Jiang2017 => jiang2017::reproduce(making)?,
         Paper::Wang2016 => wang2016::reproduce()?,
-        Paper::Zhu2020 | Paper::Zhang2014 | Paper::Li2019 | Paper::All => {
+        Paper::Zhu2020 => zhu2020::reproduce(making)?,
+        Paper::Zhang2014 | Paper::Li2019 | Paper::All => {
             let name = paper.to_possible_value();
             let name = name.as_ref().map_or("this paper", |value| value.get_name());
-            bail!("reproduce {name}: not there yet; jiang2017 and wang2016 are");
+            bail!("reproduce {name}: not there yet; jiang2017, wang2016 and zhu2020 are");
         }
     };
     outcome.write(out)?;

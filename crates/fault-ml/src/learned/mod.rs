@@ -32,7 +32,7 @@ pub use card::{Card, FORMAT, Mode, ModelKind, VERSION};
 pub use csv::{read_csv, write_csv};
 pub use dataset::{Dataset, Label, LabelledStep, Sequence, Split};
 pub use error::LearnedError;
-pub use feature::{FeatureSet, Features};
+pub use feature::{FeatureSet, FeatureTrack, Features};
 pub use history::SlidingWindow;
 pub use model::{LearnedModel, Network};
 pub use monitor::LearnedMonitor;

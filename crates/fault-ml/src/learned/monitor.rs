@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::card::Mode;
 use super::lstm::LstmState;
 use super::model::{LearnedModel, Network};
-use super::{ChannelStep, SlidingWindow};
+use super::{ChannelStep, FeatureTrack, SlidingWindow};
 use crate::{Cadence, ChannelMonitor, ChannelVerdict, Judgement, MonitorError};
 
 /// Judges a channel by a trained model; the score is the log-odds of a fault.
@@ -16,6 +16,7 @@ use crate::{Cadence, ChannelMonitor, ChannelVerdict, Judgement, MonitorError};
 pub struct LearnedMonitor {
     model: Arc<LearnedModel>,
     satellite: Option<u32>,
+    track: FeatureTrack,
     memory: Memory,
     /// Steps seen, as far as it matters: up to the window.
     seen: usize,
@@ -50,6 +51,7 @@ impl LearnedMonitor {
             }
         };
         Self {
+            track: FeatureTrack::new(card.features),
             model,
             satellite: None,
             memory,
@@ -67,12 +69,16 @@ impl LearnedMonitor {
 
     /// Takes a step and, where one is due, returns the raw score.
     fn score(&mut self, step: &ChannelStep) -> Result<Option<f32>, MonitorError> {
-        let card = self.model.card();
-        let features = card.features.features(step)?;
-        if self.satellite != Some(step.satellite) {
+        let features = if self.satellite == Some(step.satellite) {
+            self.track.next(step)?
+        } else {
+            let mut track = FeatureTrack::new(self.model.card().features);
+            let features = track.next(step)?;
             self.reset();
             self.satellite = Some(step.satellite);
-        }
+            self.track = track;
+            features
+        };
         let model = Arc::clone(&self.model);
         let card = model.card();
         self.seen = (self.seen + 1).min(card.window);
@@ -139,6 +145,7 @@ impl ChannelMonitor for LearnedMonitor {
             Memory::Window(window, _) => window.clear(),
             Memory::State(state) => state.clear(),
         }
+        self.track = FeatureTrack::new(self.model.card().features);
         self.satellite = None;
         self.seen = 0;
         self.due = 0;

@@ -57,8 +57,8 @@ impl HealthyScores {
         RateInterval::poisson(alarms, self.hours)
     }
 
-    /// The threshold that `per_hour` false alarms an hour exceed. Where fewer than one is due in what was
-    /// seen, the largest 40 peaks are continued by an exponential tail: an estimate, to be confirmed.
+    /// The threshold that `per_hour` false alarms an hour exceed. Where fewer than 40 are due in what was
+    /// seen, the largest 40 peaks are continued by a tail: an estimate, to be confirmed.
     ///
     /// # Errors
     /// [`LearnedError::Value`] for a rate that is not above zero, or fewer than 40 blocks.
@@ -81,11 +81,8 @@ impl HealthyScores {
                 .copied()
                 .unwrap_or(f64::NEG_INFINITY)
         } else {
-            // Mean excess over the 41st: the exponential's only parameter.
             let base = sorted.get(TAIL_PEAKS).copied().unwrap_or_default();
-            let excess = sorted.iter().take(TAIL_PEAKS).map(|peak| peak - base);
-            let mean = excess.sum::<f64>() / TAIL_PEAKS as f64;
-            base + mean * (TAIL_PEAKS as f64 / due).ln()
+            base + tail_excess(sorted.iter().take(TAIL_PEAKS).map(|peak| peak - base), due)
         };
         Ok(OperatingPoint {
             threshold,
@@ -94,6 +91,21 @@ impl HealthyScores {
             extrapolated,
         })
     }
+}
+
+/// What `due` of the `excesses` over their common base lie above: a generalised Pareto tail by its moments
+/// (Hosking1987), no heavier than an exponential one; scores that cannot exceed an end have a lighter one.
+fn tail_excess(excesses: impl Iterator<Item = f64> + Clone, due: f64) -> f64 {
+    let count = TAIL_PEAKS as f64;
+    let mean = excesses.clone().sum::<f64>() / count;
+    let variance = excesses.map(|e| (e - mean).powi(2)).sum::<f64>() / (count - 1.0);
+    let ratio = mean * mean / variance;
+    let shape = (0.5 * (1.0 - ratio)).clamp(-1.0, 0.0);
+    let rarer = count / due;
+    if shape.is_nan() || shape >= -1e-6 {
+        return mean * rarer.ln();
+    }
+    0.5 * mean * (ratio + 1.0) * (rarer.powf(shape) - 1.0) / shape
 }
 
 #[cfg(test)]
@@ -125,6 +137,17 @@ mod tests {
         let point = healthy.operating_point(10.0).unwrap();
         let rate = healthy.rate(point.threshold);
         assert!(rate.low < 10.0 && rate.high > 10.0, "{rate:?}");
+    }
+
+    #[test]
+    fn scores_with_an_end_keep_below_it() {
+        let mut random = ChaCha8Rng::seed_from_u64(8);
+        let mut healthy = HealthyScores::default();
+        let scores: Vec<f64> = (0..36_000).map(|_| random.random_range(0.0..1.0)).collect();
+        healthy.add(&scores, 1.0, 1);
+        let threshold = healthy.operating_point(0.01).unwrap().threshold;
+        // The 40 largest of 36000 begin at 0.9989; an exponential tail would end above 1.004.
+        assert!(threshold > 0.9989 && threshold < 1.0008, "{threshold}");
     }
 
     #[test]

@@ -6,7 +6,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::dataset::{Dataset, Label, Sequence, draw};
-use super::{FeatureSet, Features, LearnedError, Scaler};
+use super::{FeatureSet, FeatureTrack, Features, LearnedError, Scaler};
 
 /// Widths of the classes of C/N0, dB.
 const CLASS_DB: f64 = 5.0;
@@ -113,26 +113,33 @@ fn collect<'a>(
 /// Where a step holds no numbers.
 pub fn features(data: &Dataset, set: FeatureSet) -> Result<Vec<Vec<Features>>, LearnedError> {
     let of_sequence = |sequence: &Sequence| {
-        let steps = sequence.steps.iter().map(|s| set.features(&s.step));
+        let mut track = FeatureTrack::new(set);
+        let steps = sequence.steps.iter().map(|s| track.next(&s.step));
         steps.collect::<Result<Vec<_>, _>>()
     };
     Ok(data
         .sequences
         .iter()
         .map(of_sequence)
-        .collect::<Result<Vec<_>, _>>()?)
+        .collect::<Result<_, _>>()?)
 }
 
-/// A scaler by the healthy steps of `data`.
+/// A scaler by the healthy steps of `data`, whose `features` these are.
 ///
 /// # Errors
-/// Where there are none, or a step holds no numbers.
-pub fn healthy_scaler(data: &Dataset, set: FeatureSet) -> Result<Scaler, LearnedError> {
-    let all = data.sequences.iter().flat_map(|s| &s.steps);
-    let healthy = all.filter(|s| !s.label.is_faulty());
-    let rows = healthy
-        .map(|s| set.features(&s.step))
-        .collect::<Result<Vec<_>, _>>()?;
+/// Where there are none.
+pub fn healthy_scaler(data: &Dataset, features: &[Vec<Features>]) -> Result<Scaler, LearnedError> {
+    let healthy = |(sequence, features): (&'_ Sequence, &'_ Vec<Features>)| {
+        let labelled = sequence.steps.iter().zip(features);
+        let healthy = labelled.filter(|(step, _)| !step.label.is_faulty());
+        healthy.map(|(_, features)| *features).collect::<Vec<_>>()
+    };
+    let rows: Vec<Features> = data
+        .sequences
+        .iter()
+        .zip(features)
+        .flat_map(healthy)
+        .collect();
     Ok(Scaler::fit(rows.iter())?)
 }
 
