@@ -125,6 +125,22 @@ pub struct Accuracy {
     pub steady_by_class: Vec<(i64, BalancedAccuracy)>,
 }
 
+impl Accuracy {
+    /// Balanced accuracy in class number `index`, over all windows or those in which nothing changes; zero where
+    /// there is no such class.
+    #[must_use]
+    pub fn of_class(&self, index: usize, steady: bool) -> f64 {
+        let classes = if steady {
+            &self.steady_by_class
+        } else {
+            &self.by_class
+        };
+        classes
+            .get(index)
+            .map_or(0.0, |(_, accuracy)| accuracy.value())
+    }
+}
+
 /// Windows trained on.
 const TRAINED_ON: usize = 3000;
 

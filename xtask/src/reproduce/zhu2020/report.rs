@@ -64,14 +64,7 @@ pub fn figures(study: &Study) -> Value {
                     .iter()
                     .enumerate()
                     .map(|(index, (class, _))| {
-                        let value = |a: &Accuracy| {
-                            let all = if steady {
-                                &a.steady_by_class
-                            } else {
-                                &a.by_class
-                            };
-                            all[index].1.value()
-                        };
+                        let value = |a: &Accuracy| a.of_class(index, steady);
                         (class.to_string(), json!(of(&value)))
                     });
             Value::Object(classes.collect())
@@ -174,14 +167,7 @@ fn by_class(study: &Study) -> String {
                 if steady { "steady" } else { "all" }
             );
             for index in 0..cell.trainings[0].by_class.len() {
-                let value = |a: &Accuracy| {
-                    let all = if steady {
-                        &a.steady_by_class
-                    } else {
-                        &a.by_class
-                    };
-                    all[index].1.value()
-                };
+                let value = |a: &Accuracy| a.of_class(index, steady);
                 let _ = write!(text, " {:.4} |", cell.mean_and_deviation(value).0);
             }
             text.push('\n');
