@@ -7,4 +7,5 @@ pub mod judged;
 pub mod reproduce;
 pub mod scenario;
 pub mod tidy;
+pub mod train;
 pub mod validate;

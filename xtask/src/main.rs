@@ -13,6 +13,7 @@ use xtask::reproduce::{Making, Paper, reproduce};
 use xtask::scenario::command::{self as scenario, Command};
 use xtask::scenario::make::Level;
 use xtask::tidy::{Severity, tidy, workspace_root};
+use xtask::train::{Trained, command as training};
 use xtask::validate::threshold::Thresholds;
 use xtask::validate::{consistency, front_ends, levels, sensitivity, starts};
 
@@ -78,6 +79,24 @@ enum Task {
         seeds: Option<u16>,
         /// Folder that receives a folder of the paper's name.
         #[arg(long, value_name = "DIR", default_value = "reproduced")]
+        out: PathBuf,
+    },
+    /// Train a monitor on made-up runs, examine it beside the innovation test, write model and card
+    Train {
+        /// Which monitor
+        #[arg(value_enum)]
+        monitor: Trained,
+        /// Labelled steps (CSV, as --save-data writes them) in place of runs
+        #[arg(long, value_name = "CSV", conflicts_with = "runs")]
+        data: Option<PathBuf>,
+        /// Also write the labelled steps
+        #[arg(long, value_name = "CSV")]
+        save_data: Option<PathBuf>,
+        /// Scenarios made and received
+        #[arg(long, value_name = "N", default_value_t = 160, value_parser = clap::value_parser!(u32).range(40..))]
+        runs: u32,
+        /// Folder of the model
+        #[arg(long, value_name = "DIR", default_value = "assets/models")]
         out: PathBuf,
     },
     /// Check the layers, module comments and what no compiler checks.
@@ -236,6 +255,25 @@ fn perform(task: Task) -> Result<ExitCode> {
             let outcome = reproduce(paper, Making { level, seeds }, &folder)?;
             writeln!(out, "{outcome}")?;
             Ok(verdict(outcome.holds()))
+        }
+        Task::Train {
+            monitor,
+            data,
+            save_data,
+            runs,
+            out: folder,
+        } => {
+            let data = match data {
+                Some(path) => training::read(&path)?,
+                None => training::simulate(runs)?,
+            };
+            if let Some(path) = save_data {
+                training::write(&data, &path)?;
+            }
+            let report = training::train(monitor, data)?;
+            report.write(&folder)?;
+            write!(out, "{report}")?;
+            Ok(ExitCode::SUCCESS)
         }
         Task::Tidy => {
             let findings = tidy(&workspace_root())?;

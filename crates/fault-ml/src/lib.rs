@@ -4,7 +4,8 @@
 //! of all satellites. Both state a score and the threshold it is held against: faulty is exactly
 //! a score above its threshold. What to do about it is for others to decide.
 //!
-//! [`InnovationTest`] is the first monitor: it needs no training.
+//! [`InnovationTest`] is the first monitor: it needs no training. [`learned`] holds those that do,
+//! [`metrics`] the figures by which all are compared.
 //!
 //! [`particle`] holds integrity monitoring by particle filters, [`classical`] the detectors it is
 //! measured against. Both take [`Sight`]s, lines of sight and residuals about a reference point, and
@@ -58,7 +59,9 @@ mod golden;
 mod innovation_test;
 mod integrity;
 mod judgement;
+pub mod learned;
 mod linearise;
+pub mod metrics;
 mod noise_fit;
 mod noise_model;
 pub mod particle;

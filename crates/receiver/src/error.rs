@@ -15,6 +15,9 @@ pub enum ReceiverError {
     /// A monitor was given what it cannot judge.
     #[error(transparent)]
     Monitor(#[from] fault_ml::MonitorError),
+    /// A trained monitor is none.
+    #[error(transparent)]
+    Model(#[from] fault_ml::learned::LearnedError),
     /// A file could not be read or written.
     #[error("{}: {source}", path.display())]
     File {

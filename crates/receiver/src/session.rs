@@ -1,11 +1,13 @@
 //! One run of the receiver over any source of correlator sums, with its files.
 
+use fault_ml::learned::ModelKind;
 use gnss_nav::GpsTime;
 use gnss_signal::{CorrelatorBank, SignalId};
 
 use crate::ReceiverError;
-use crate::config::{Ionosphere, Mode, RunConfig, Troposphere};
+use crate::config::{Ionosphere, Mode, MonitorChoice, RunConfig, Troposphere};
 use crate::cost::Meter;
+use crate::models::default_model;
 use crate::pipeline::{self, Aiding, Outcome, Settings, VectorSettings};
 use crate::rinex_nav::{self, NavigationFile};
 use crate::samples;
@@ -105,28 +107,37 @@ fn settings(config: &RunConfig, nav: Option<NavigationFile>) -> Result<Settings,
         aiding,
         duration_s: config.recording.duration_s,
         dump_taps: config.dump_taps,
-        vector: (config.mode == Mode::Vector).then(|| vector(config)),
+        vector: (config.mode == Mode::Vector)
+            .then(|| vector(config))
+            .transpose()?,
         ..Settings::default()
     })
 }
 
 /// Monitors whose scores are written.
 fn monitors(config: &RunConfig) -> Vec<String> {
-    let running = config.mode == Mode::Vector && config.innovation_test;
-    running
-        .then(|| "innovation".to_owned())
-        .into_iter()
-        .collect()
+    let running = config
+        .monitors
+        .iter()
+        .filter(|_| config.mode == Mode::Vector);
+    running.map(|monitor| monitor.name().to_owned()).collect()
 }
 
-fn vector(config: &RunConfig) -> VectorSettings {
+fn vector(config: &RunConfig) -> Result<VectorSettings, ReceiverError> {
     let default = VectorSettings::default();
-    VectorSettings {
+    let learned = config.monitors.iter().filter_map(|monitor| match monitor {
+        MonitorChoice::Innovation => None,
+        MonitorChoice::Svm => Some(ModelKind::Svm),
+        MonitorChoice::Lstm => Some(ModelKind::Lstm),
+    });
+    let innovation = config.monitors.contains(&MonitorChoice::Innovation);
+    Ok(VectorSettings {
         filter: config.filter,
         policy: config.policy,
-        monitor: default.monitor.filter(|_| config.innovation_test),
+        monitor: default.monitor.filter(|_| innovation),
+        learned: learned.map(default_model).collect::<Result<_, _>>()?,
         ..default
-    }
+    })
 }
 
 /// Ephemerides of another time than the recording's would silently help nothing.

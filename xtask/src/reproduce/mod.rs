@@ -6,6 +6,7 @@ pub mod li2019;
 mod outcome;
 pub mod report;
 pub mod wang2016;
+pub mod zhu2020;
 
 use std::path::Path;
 
@@ -51,10 +52,11 @@ pub fn reproduce(paper: Paper, making: Making, out: &Path) -> Result<Outcome> {
         Paper::Jiang2017 => jiang2017::reproduce(making)?,
         Paper::Li2019 => li2019::reproduce(making)?,
         Paper::Wang2016 => wang2016::reproduce()?,
-        Paper::Zhu2020 | Paper::Zhang2014 | Paper::All => {
+        Paper::Zhu2020 => zhu2020::reproduce(making)?,
+        Paper::Zhang2014 | Paper::All => {
             let name = paper.to_possible_value();
             let name = name.as_ref().map_or("this paper", |value| value.get_name());
-            bail!("reproduce {name}: not there yet; jiang2017, wang2016 and li2019 are");
+            bail!("reproduce {name}: not there yet; jiang2017, wang2016, li2019 and zhu2020 are");
         }
     };
     outcome.write(out)?;

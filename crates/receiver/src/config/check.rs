@@ -7,8 +7,8 @@ use gnss_signal::SignalId;
 use gnss_signal::sample::{SampleDescription, SampleFormat};
 
 use super::{
-    AcquireConfig, AcquireOptions, Input, Ionosphere, Isa, Mode, Recording, RunConfig, RunOptions,
-    Troposphere,
+    AcquireConfig, AcquireOptions, Input, Ionosphere, Isa, Mode, MonitorChoice, Recording,
+    RunConfig, RunOptions, Troposphere,
 };
 use crate::ReceiverError;
 use crate::pipeline::{FilterKind, Policy};
@@ -61,7 +61,7 @@ impl Checks<'_> {
             time: given.time.as_deref().map(|t| self.time(t)).transpose()?,
             mode: self.mode(given)?,
             filter: self.filter(given)?,
-            innovation_test: self.innovation_test(given)?,
+            monitors: self.monitors(given)?,
             policy: self.policy(given)?,
             rate_hz: given.rate.unwrap_or(10.0),
             ionosphere: self.ionosphere(given.ionosphere.as_deref())?,
@@ -110,7 +110,7 @@ impl Checks<'_> {
         self.elevation_mask(given.elevation_mask)?;
         self.mode(given)?;
         self.filter(given)?;
-        self.innovation_test(given)?;
+        self.monitors(given)?;
         self.policy(given)?;
         self.choice("raim", given.raim.as_deref(), "none", &[("none", ())])?;
         self.choice("dump", given.dump.as_deref(), "taps", &[("taps", ())])?;
@@ -307,9 +307,26 @@ impl Checks<'_> {
         self.choice("filter", given.filter.as_deref(), "sequential", &filters)
     }
 
-    fn innovation_test(&self, given: &RunOptions) -> Result<bool, ReceiverError> {
-        let monitors = [("innovation", true), ("none", false)];
-        self.choice("monitor", given.monitor.as_deref(), "innovation", &monitors)
+    fn monitors(&self, given: &RunOptions) -> Result<Vec<MonitorChoice>, ReceiverError> {
+        use MonitorChoice::{Innovation, Lstm, Svm};
+        let [innovation, svm, lstm] = [Innovation, Svm, Lstm].map(|m| (m.name(), Some(m)));
+        let choices = [innovation, svm, lstm, ("none", None)];
+        let chosen = |name: &String| self.choice("monitor", Some(name), "", &choices);
+        if given.monitor.is_empty() {
+            return Ok(vec![Innovation]);
+        }
+        let all = given
+            .monitor
+            .iter()
+            .map(chosen)
+            .collect::<Result<Vec<_>, _>>()?;
+        if all.contains(&None) && all.len() > 1 {
+            return Err(self.wrong("monitor", "none", "nothing beside it"));
+        }
+        let mut monitors: Vec<MonitorChoice> = all.into_iter().flatten().collect();
+        monitors.sort_unstable();
+        monitors.dedup();
+        Ok(monitors)
     }
 
     fn policy(&self, given: &RunOptions) -> Result<Policy, ReceiverError> {

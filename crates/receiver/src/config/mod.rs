@@ -5,6 +5,8 @@
 //! them as given, [`RunOptions::check`] turns them into a [`RunConfig`].
 
 mod check;
+#[cfg(test)]
+mod monitor_tests;
 mod options;
 mod solve;
 #[cfg(test)]
@@ -79,6 +81,29 @@ pub enum Mode {
     Vector,
 }
 
+/// A monitor of a channel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum MonitorChoice {
+    /// The innovation test.
+    Innovation,
+    /// The support-vector machine that comes with the receiver.
+    Svm,
+    /// The long short-term memory that comes with it.
+    Lstm,
+}
+
+impl MonitorChoice {
+    /// Name in options and results.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Innovation => "innovation",
+            Self::Svm => "svm",
+            Self::Lstm => "lstm",
+        }
+    }
+}
+
 /// Instruction set of the correlators.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Isa {
@@ -109,8 +134,8 @@ pub struct RunConfig {
     pub mode: Mode,
     /// Which filter, in vector mode.
     pub filter: FilterKind,
-    /// Whether every channel is watched by the innovation test, in vector mode.
-    pub innovation_test: bool,
+    /// Who watches every channel in vector mode, each once, in order.
+    pub monitors: Vec<MonitorChoice>,
     /// What follows from a monitor's alarm.
     pub policy: Policy,
     /// Navigation epochs per second.

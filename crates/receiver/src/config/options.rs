@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use serde::Deserialize;
+use serde::{Deserialize, Deserializer};
 
 use super::check::{Checks, Origin};
 use super::{AcquireConfig, RunConfig};
@@ -51,9 +51,11 @@ pub struct RunOptions {
     /// Filter of vector mode: sequential or batch [default: sequential]
     #[arg(long, value_name = "FILTER")]
     pub filter: Option<String>,
-    /// Monitor of every channel in vector mode: innovation or none [default: innovation]
+    /// Monitor of every channel in vector mode: innovation, svm, lstm, or none; may be repeated
+    /// [default: innovation]
     #[arg(long, value_name = "MONITOR")]
-    pub monitor: Option<String>,
+    #[serde(deserialize_with = "one_or_several")]
+    pub monitor: Vec<String>,
     /// What follows from a monitor's alarm: observe, deweight (variance times 100) or exclude
     /// [default: exclude]
     #[arg(long, value_name = "POLICY")]
@@ -192,7 +194,11 @@ impl RunOptions {
             time: self.time.or(fallback.time),
             mode: self.mode.or(fallback.mode),
             filter: self.filter.or(fallback.filter),
-            monitor: self.monitor.or(fallback.monitor),
+            monitor: if self.monitor.is_empty() {
+                fallback.monitor
+            } else {
+                self.monitor
+            },
             policy: self.policy.or(fallback.policy),
             rate: self.rate.or(fallback.rate),
             raim: self.raim.or(fallback.raim),
@@ -238,6 +244,20 @@ impl AcquireOptions {
     pub fn check(&self) -> Result<AcquireConfig, ReceiverError> {
         Checks(&Origin::CommandLine).acquire(self)
     }
+}
+
+/// A text, or a list of texts.
+fn one_or_several<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<String>, D::Error> {
+    #[derive(Deserialize)]
+    #[serde(untagged)]
+    enum Given {
+        One(String),
+        Several(Vec<String>),
+    }
+    Ok(match Given::deserialize(deserializer)? {
+        Given::One(text) => vec![text],
+        Given::Several(texts) => texts,
+    })
 }
 
 /// Message and line of a TOML error; its own display draws several lines.

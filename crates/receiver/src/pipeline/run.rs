@@ -2,7 +2,6 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use fault_ml::InnovationTest;
 use gnss_nav::SatelliteId;
 use gnss_signal::tracking::{NoiseFloor, Spectrum, TrackingSettings};
 use gnss_signal::{CorrelatorBank, FrontEnd, Replica, SignalId, Taps};
@@ -14,7 +13,7 @@ use super::schedule::Schedule;
 use super::settings::Settings;
 use super::slot::Slot;
 use super::spectrum::SpectrumSense;
-use super::vector::{VectorSettings, VectorTracking};
+use super::vector::{Monitor, VectorSettings, VectorTracking};
 use crate::ReceiverError;
 use crate::record::{Event, EventKind, Record};
 
@@ -34,7 +33,7 @@ pub fn run<B: CorrelatorBank>(
 ) -> Result<Outcome, ReceiverError> {
     let front_end = bank.front_end();
     let unused = SignalId::gps_l1_ca(NOISE_PRN)?;
-    let monitor = settings.vector.as_ref().map(VectorSettings::monitor);
+    let monitors = settings.vector.as_ref().map(VectorSettings::monitors);
     let mut run = Run {
         noise: NoiseFloor::new(unused, front_end)?,
         navigator: Navigator::new(settings, front_end.sample_rate_hz),
@@ -53,7 +52,7 @@ pub fn run<B: CorrelatorBank>(
         fixed: Fixed::Never,
         channel_steps: 0,
         steps: 0,
-        monitor: monitor.transpose()?.flatten(),
+        monitors: monitors.transpose()?.unwrap_or_default(),
         vector: None,
         consistent_fixes: 0,
         next_look_s: 0.0,
@@ -89,8 +88,8 @@ pub(super) struct Run<'a, B> {
     pub(super) fixed: Fixed,
     pub(super) channel_steps: usize,
     pub(super) steps: usize,
-    /// The innovation test of a channel, empty: its threshold takes long to find.
-    pub(super) monitor: Option<InnovationTest>,
+    /// The monitors of a channel, which have seen nothing.
+    pub(super) monitors: Vec<Monitor>,
     pub(super) vector: Option<VectorTracking>,
     /// Successive fixes whose measurements agree.
     pub(super) consistent_fixes: u32,

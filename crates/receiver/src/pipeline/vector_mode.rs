@@ -37,8 +37,8 @@ impl<B: CorrelatorBank> Run<'_, B> {
             return Ok(());
         };
         let model = self.navigator.model();
-        let (raw, monitor) = (&navigated.raw, self.monitor.clone());
-        let started = VectorTracking::start(&around, solution, raw, model, settings, monitor);
+        let (raw, monitors) = (&navigated.raw, self.monitors.clone());
+        let started = VectorTracking::start(&around, solution, raw, model, settings, monitors);
         let Some(tracking) = where_numbers_allow(started)? else {
             self.consistent_fixes = 0;
             return Ok(());

@@ -6,6 +6,7 @@
 mod bit_slip;
 mod clock_step;
 mod filter;
+mod monitors;
 mod report;
 mod settings;
 mod steering;
@@ -13,7 +14,6 @@ mod watch;
 
 use std::collections::{BTreeMap, VecDeque};
 
-use fault_ml::InnovationTest;
 use gnss_nav::filter::{
     Advice, Disposition, EpochGeometry, FaultLogic, FaultThresholds, Innovations, NavFilter,
     Observable, SatelliteInnovation, SkipReason, Update,
@@ -34,6 +34,7 @@ use crate::record::EventKind;
 
 use clock_step::ClockStep;
 use filter::{filter, from_solution};
+pub(super) use monitors::Monitor;
 pub(super) use report::observations;
 pub use settings::{FilterKind, MeasurementNoise, Policy, VectorSettings};
 pub(super) use steering::steering;
@@ -121,7 +122,7 @@ pub(super) struct VectorTracking {
     filter: Box<dyn NavFilter>,
     settings: VectorSettings,
     model: MeasurementModel,
-    monitor: Option<InnovationTest>,
+    monitors: Vec<Monitor>,
     faults: FaultLogic,
     watches: BTreeMap<SatelliteId, Watch>,
     geometry: Option<EpochGeometry>,
@@ -147,13 +148,13 @@ impl VectorTracking {
         raw: &[RawMeasurement],
         model: MeasurementModel,
         settings: &VectorSettings,
-        monitor: Option<InnovationTest>,
+        monitors: Vec<Monitor>,
     ) -> Result<Self, ReceiverError> {
         let measurements = form(around.receive_time, raw, around.store).measurements;
         Ok(Self {
             filter: from_solution(solution, &measurements, &model, settings)?,
             model,
-            monitor,
+            monitors,
             faults: FaultLogic::new(FaultThresholds::default())?,
             watches: BTreeMap::new(),
             geometry: None,
@@ -294,7 +295,7 @@ impl VectorTracking {
         let clean = (READMIT_S / self.settings.interval_s) as u32;
         self.watches
             .entry(satellite)
-            .or_insert_with(|| Watch::new(self.monitor.clone(), clean))
+            .or_insert_with(|| Watch::new(self.monitors.clone(), clean))
     }
 
     /// What is expected of a satellite at the epoch.
@@ -369,8 +370,12 @@ impl VectorTracking {
         let mut dispositions = Vec::new();
         for innovation in innovations.satellites() {
             let satellite = innovation.satellite;
+            let Some(member) = epoch.members.iter().find(|m| m.satellite == satellite) else {
+                continue;
+            };
+            let step = monitors::step(innovation, &member.epoch);
             let watch = self.watch(satellite);
-            let change = watch.judge(innovation)?;
+            let change = watch.judge(&step)?;
             dispositions.push((satellite, watch.disposition(policy)));
             if let Some(change) = change {
                 report::change(satellite, &change, policy, &mut epoch.events);

@@ -1,5 +1,6 @@
 //! Records of vector tracking.
 
+use fault_ml::Judgement;
 use gnss_nav::filter::Disposition;
 use gnss_nav::{GpsTime, SatelliteId};
 use gnss_signal::tracking::Lock;
@@ -83,7 +84,7 @@ impl VectorTracking {
             innovation_code_m: code,
             innovation_rate_mps: rate,
             disposition: disposition(member.disposition),
-            scores: watch.and_then(score).into_iter().collect(),
+            scores: watch.map(scores).unwrap_or_default(),
         }
     }
 }
@@ -109,12 +110,13 @@ pub(in crate::pipeline) fn observations(
     }
 }
 
-fn score(watch: &Watch) -> Option<ScoreRecord> {
-    watch.judgement().map(|judgement| ScoreRecord {
-        monitor: "innovation".to_owned(),
+fn scores(watch: &Watch) -> Vec<ScoreRecord> {
+    let score = |(monitor, judgement): &(&str, Judgement)| ScoreRecord {
+        monitor: (*monitor).to_owned(),
         score: judgement.score(),
         threshold: judgement.threshold(),
-    })
+    };
+    watch.judgements().iter().map(score).collect()
 }
 
 const fn disposition(told: Option<Disposition>) -> record::Disposition {

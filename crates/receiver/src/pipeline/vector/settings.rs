@@ -1,9 +1,13 @@
 //! Settings of vector tracking.
 
+use std::sync::Arc;
+
+use fault_ml::learned::{LearnedModel, LearnedMonitor};
 use fault_ml::{InnovationTest, InnovationTestSettings};
 use gnss_nav::dynamics::ProcessNoise;
 use gnss_nav::filter::Gate;
 
+use super::monitors::Monitor;
 use crate::ReceiverError;
 
 /// Longest time between two updates, s: the steering of a car does not hold longer.
@@ -63,16 +67,18 @@ pub struct VectorSettings {
     /// The innovation test of every channel, once per update. Default: at 0.01 false alarms per channel
     /// and hour.
     pub monitor: Option<InnovationTestSettings>,
+    /// Trained monitors of every channel beside it. Default: none.
+    pub learned: Vec<Arc<LearnedModel>>,
     /// What follows from its alarms. Default: exclusion.
     pub policy: Policy,
 }
 
 impl VectorSettings {
-    /// The innovation test of a channel, where there is one, if all settings are possible.
+    /// The monitors of a channel, if all settings are possible.
     ///
     /// # Errors
     /// Naming the first value that is not.
-    pub(in crate::pipeline) fn monitor(&self) -> Result<Option<InnovationTest>, ReceiverError> {
+    pub(in crate::pipeline) fn monitors(&self) -> Result<Vec<Monitor>, ReceiverError> {
         self.process_noise.check()?;
         if !(self.interval_s > 0.0 && self.interval_s <= LONGEST_INTERVAL_S) {
             let given = self.interval_s;
@@ -80,7 +86,29 @@ impl VectorSettings {
                 what: format!("the filter's interval is {given} s: expected above 0 and at most 1"),
             });
         }
-        Ok(self.monitor.map(InnovationTest::new).transpose()?)
+        let test = self.monitor.map(InnovationTest::new).transpose()?;
+        let mut monitors = Vec::from_iter(test.map(|t| Monitor::Innovation(Box::new(t))));
+        for model in &self.learned {
+            self.fits(model)?;
+            let monitor = LearnedMonitor::new(Arc::clone(model));
+            monitors.push(Monitor::Learned(Box::new(monitor)));
+        }
+        Ok(monitors)
+    }
+
+    /// Refuses a model that has learned at another rate.
+    fn fits(&self, model: &LearnedModel) -> Result<(), ReceiverError> {
+        let (card, ours_s) = (model.card(), self.interval_s);
+        if (card.interval_s - ours_s).abs() < 1e-6 {
+            return Ok(());
+        }
+        Err(ReceiverError::Option {
+            what: format!(
+                "the monitor {} has learned from updates every {} s: the filter's interval is {ours_s} s",
+                card.kind.name(),
+                card.interval_s
+            ),
+        })
     }
 
     /// Whether an update is due `since_s` after the last, give or take the rounding of ticks.
@@ -102,6 +130,7 @@ impl Default for VectorSettings {
                 epoch_rate_hz: 1.0 / interval_s,
                 ..InnovationTestSettings::default()
             }),
+            learned: Vec::new(),
             policy: Policy::Exclude,
         }
     }
@@ -124,12 +153,12 @@ mod tests {
 
     #[test]
     fn impossible_settings_are_named() {
-        assert!(VectorSettings::default().monitor().is_ok());
+        assert!(VectorSettings::default().monitors().is_ok());
         let settings = VectorSettings {
             interval_s: f64::NAN,
             ..VectorSettings::default()
         };
-        let text = settings.monitor().unwrap_err().to_string();
+        let text = settings.monitors().unwrap_err().to_string();
         assert!(text.starts_with("the filter's interval is NaN s"), "{text}");
         let settings = VectorSettings {
             monitor: Some(InnovationTestSettings {
@@ -138,6 +167,6 @@ mod tests {
             }),
             ..VectorSettings::default()
         };
-        assert!(settings.monitor().is_err());
+        assert!(settings.monitors().is_err());
     }
 }

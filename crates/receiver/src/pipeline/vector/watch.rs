@@ -1,17 +1,19 @@
-//! Whether a satellite is believed: its monitor, and what followed from it.
+//! Whether a satellite is believed: its monitors, and what followed from them.
 
-use fault_ml::{ChannelMonitor, ChannelVerdict, Innovation, InnovationTest, Judgement};
-use gnss_nav::filter::{Disposition, FaultThresholds, SatelliteInnovation};
+use fault_ml::learned::ChannelStep;
+use fault_ml::{ChannelVerdict, Health, Judgement};
+use gnss_nav::filter::{Disposition, FaultThresholds};
 
+use super::monitors::Monitor;
 use super::settings::Policy;
 use crate::ReceiverError;
 
 /// One satellite under watch.
 #[derive(Debug, Clone)]
 pub(super) struct Watch {
-    monitor: Option<InnovationTest>,
+    monitors: Vec<Monitor>,
     suspended: Option<Suspended>,
-    judgement: Option<Judgement>,
+    judgements: Vec<(&'static str, Judgement)>,
     clean_to_readmit: u32,
 }
 
@@ -36,62 +38,53 @@ pub(super) enum Change {
 impl Watch {
     /// A satellite of which nothing is known; once suspended it takes `clean_to_readmit` healthy epochs
     /// to be believed again.
-    pub(super) const fn new(monitor: Option<InnovationTest>, clean_to_readmit: u32) -> Self {
+    pub(super) const fn new(monitors: Vec<Monitor>, clean_to_readmit: u32) -> Self {
         Self {
-            monitor,
+            monitors,
             suspended: None,
-            judgement: None,
+            judgements: Vec::new(),
             clean_to_readmit,
         }
     }
 
-    /// The signal is gone: what its monitor saw no longer counts.
+    /// The signal is gone: what its monitors saw no longer counts.
     pub(super) fn lost(&mut self) {
-        if let Some(monitor) = &mut self.monitor {
-            monitor.reset();
-        }
-        self.judgement = None;
+        self.monitors.iter_mut().for_each(Monitor::reset);
+        self.judgements.clear();
     }
 
-    /// Judges this epoch's innovation; returns what changed by it.
+    /// Shows this epoch to every monitor; returns what changed by it.
     ///
     /// # Errors
     /// Where the innovation is no number.
-    pub(super) fn judge(
-        &mut self,
-        innovation: &SatelliteInnovation,
-    ) -> Result<Option<Change>, ReceiverError> {
-        let Some(monitor) = &mut self.monitor else {
-            return Ok(None);
-        };
-        let (rate_mps, rate_sigma_mps) = innovation.rate.map_or((0.0, f64::INFINITY), |rate| {
-            (rate.value(), rate.variance().sqrt())
-        });
-        let verdict = monitor.step(&Innovation {
-            code_m: innovation.code.value(),
-            code_sigma_m: innovation.code.variance().sqrt(),
-            rate_mps,
-            rate_sigma_mps,
-        })?;
-        self.judgement = verdict.judgement().copied();
-        Ok(self.follow(&verdict))
+    pub(super) fn judge(&mut self, step: &ChannelStep) -> Result<Option<Change>, ReceiverError> {
+        self.judgements.clear();
+        for monitor in &mut self.monitors {
+            if let ChannelVerdict::Judged(judgement) = monitor.step(step)? {
+                self.judgements.push((monitor.name(), judgement));
+            }
+        }
+        Ok(self.follow())
     }
 
-    fn follow(&mut self, verdict: &ChannelVerdict) -> Option<Change> {
-        let ChannelVerdict::Judged(judgement) = verdict else {
+    /// One monitor is enough to suspend; to be believed again all that judge must find it healthy.
+    fn follow(&mut self) -> Option<Change> {
+        if self.judgements.is_empty() {
             return None;
-        };
-        match (&mut self.suspended, verdict.is_faulty()) {
-            (None, true) => {
+        }
+        let mut judgements = self.judgements.iter();
+        let faulty = judgements.find(|(_, judgement)| judgement.health() == Health::Faulty);
+        match (&mut self.suspended, faulty) {
+            (None, Some((monitor, judgement))) => {
                 self.suspended = Some(Suspended::default());
                 Some(Change::Alarm {
-                    monitor: "innovation",
+                    monitor,
                     judgement: *judgement,
                 })
             }
-            (None, false) => None,
+            (None, None) => None,
             (Some(suspended), faulty) => {
-                suspended.clean_epochs = if faulty {
+                suspended.clean_epochs = if faulty.is_some() {
                     0
                 } else {
                     suspended.clean_epochs + 1
@@ -108,7 +101,7 @@ impl Watch {
     /// The gate refused measurements of `skipped` of the last epochs; returns what changed by it.
     /// Without a monitor nothing could clear the satellite again, and nothing is done.
     pub(super) fn isolate(&mut self, skipped: f64) -> Option<Change> {
-        if self.suspended.is_some() || self.monitor.is_none() {
+        if self.suspended.is_some() || self.monitors.is_empty() {
             return None;
         }
         // So many epochs and more: the threshold itself is exceeded.
@@ -132,8 +125,8 @@ impl Watch {
         }
     }
 
-    /// Score and threshold of the last epoch, where there are any.
-    pub(super) const fn judgement(&self) -> Option<&Judgement> {
-        self.judgement.as_ref()
+    /// Monitor, score and threshold of the last epoch, of each that judged.
+    pub(super) fn judgements(&self) -> &[(&'static str, Judgement)] {
+        &self.judgements
     }
 }

@@ -1,0 +1,34 @@
+//! What a learned monitor sees of a channel at one step.
+
+use crate::Innovation;
+
+/// One channel at one update of the navigation filter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ChannelStep {
+    /// Whose, by any number the caller likes; another one starts the monitor anew.
+    pub satellite: u32,
+    /// What the filter did not expect; without a range rate its deviation is infinite.
+    pub innovation: Innovation,
+    /// C/N0, smoothed, dB-Hz.
+    pub cn0_dbhz: f64,
+    /// Power of the last prompt sum over that of its noise, a ratio.
+    pub prompt_power: f64,
+}
+
+#[cfg(test)]
+impl ChannelStep {
+    /// Innovations of so many deviations (8 m, 0.2 m/s) at 45 dB-Hz.
+    pub(crate) fn normal(satellite: u32, code: f64, rate: f64) -> Self {
+        Self {
+            satellite,
+            innovation: Innovation {
+                code_m: 8.0 * code,
+                code_sigma_m: 8.0,
+                rate_mps: 0.2 * rate,
+                rate_sigma_mps: 0.2,
+            },
+            cn0_dbhz: 45.0,
+            prompt_power: 600.0,
+        }
+    }
+}

@@ -1,0 +1,51 @@
+//! Which monitors run, as options and configuration files say it.
+
+use super::{MonitorChoice, RunOptions};
+
+fn options(text: &str) -> RunOptions {
+    toml::from_str(text).unwrap()
+}
+
+#[test]
+fn a_monitor_or_several_may_be_named() {
+    assert_eq!(options("").monitor, Vec::<String>::new());
+    assert_eq!(options("monitor = 'svm'").monitor, ["svm"]);
+    assert_eq!(
+        options("monitor = ['lstm', 'innovation']").monitor,
+        ["lstm", "innovation"]
+    );
+    let given = options("monitor = 'svm'").or(options("monitor = 'lstm'"));
+    assert_eq!(given.monitor, ["svm"]);
+    let none_given = RunOptions::default().or(options("monitor = 'lstm'"));
+    assert_eq!(none_given.monitor, ["lstm"]);
+}
+
+#[test]
+fn each_runs_once_and_none_stands_alone() {
+    let check = |text: &str| {
+        let folder = tempfile::tempdir().unwrap();
+        let input = folder.path().join("x.bin");
+        std::fs::write(&input, [0; 8]).unwrap();
+        let options = RunOptions {
+            input: Some(input),
+            format: Some("ci8".to_owned()),
+            sample_rate: Some(2e6),
+            ..options(text)
+        };
+        options.check().map(|config| config.monitors)
+    };
+    use MonitorChoice::{Innovation, Lstm};
+    assert_eq!(check("").unwrap(), [Innovation]);
+    assert_eq!(check("monitor = 'none'").unwrap(), []);
+    assert_eq!(
+        check("monitor = ['lstm', 'innovation', 'lstm']").unwrap(),
+        [Innovation, Lstm]
+    );
+    let error = check("monitor = ['none', 'svm']").unwrap_err().to_string();
+    assert!(error.contains("nothing beside it"), "{error}");
+    let error = check("monitor = 'ewma'").unwrap_err().to_string();
+    assert!(
+        error.contains("one of innovation, svm, lstm, none"),
+        "{error}"
+    );
+}

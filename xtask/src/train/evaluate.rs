@@ -1,0 +1,254 @@
+//! One examination for every monitor: what it sees, how soon, and what it cries wolf at.
+
+use anyhow::Result;
+use fault_ml::learned::{Dataset, HealthyScores, choose, cn0_class_dbhz};
+use fault_ml::metrics::{BalancedAccuracy, RateInterval, Roc, Share};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
+
+use super::scoring::{Examinee, healthy};
+
+/// Windows that areas and accuracies are taken over, evenly by kind, fault and C/N0.
+const EXAMINED: usize = 20_000;
+/// Draws of the bootstrap.
+const ROUNDS: usize = 200;
+
+/// A decision on a window.
+#[derive(Debug, Clone, Copy)]
+struct Decision {
+    scenario: u32,
+    score: f64,
+    faulty: bool,
+    /// Whether the label changed within the window.
+    new: bool,
+    cn0_dbhz: i64,
+}
+
+/// What an alarm threshold does to one kind of fault.
+#[derive(Debug, Clone, Default)]
+pub struct OnFault {
+    /// Faults in the test scenarios.
+    pub faults: usize,
+    /// Time from the true onset to the first alarm, s, of those that alarmed.
+    pub delays_s: Vec<f64>,
+}
+
+impl OnFault {
+    /// Part that was found, with its interval.
+    #[must_use]
+    pub fn detected(&self) -> Share {
+        Share::of(self.delays_s.len(), self.faults)
+    }
+
+    /// Median time to the alarm, those never found counting as endless, s.
+    #[must_use]
+    pub fn median_delay_s(&self) -> f64 {
+        let mut delays = self.delays_s.clone();
+        delays.resize(self.faults, f64::INFINITY);
+        delays.sort_by(f64::total_cmp);
+        delays
+            .get(self.faults.saturating_sub(1) / 2)
+            .copied()
+            .unwrap_or(f64::INFINITY)
+    }
+}
+
+/// The figures of one monitor.
+#[derive(Debug, Clone)]
+pub struct Examination {
+    /// Name.
+    pub name: String,
+    /// Area under the ROC, and its band over scenarios.
+    pub area: f64,
+    /// Lower and upper end of the band.
+    pub area_band: (f64, f64),
+    /// Area of each fault against all healthy windows.
+    pub area_by_fault: BTreeMap<String, f64>,
+    /// Largest balanced accuracy of any threshold on the validation scenarios, applied to the test.
+    pub balanced: BalancedAccuracy,
+    /// The same without windows in which the label changed.
+    pub balanced_steady: BalancedAccuracy,
+    /// By class of C/N0, dB-Hz.
+    pub balanced_by_cn0: BTreeMap<i64, BalancedAccuracy>,
+    /// Alarm threshold.
+    pub threshold: f64,
+    /// False alarms of healthy test channels at it.
+    pub false_alarms: RateInterval,
+    /// By fault, at it.
+    pub faults: BTreeMap<String, OnFault>,
+}
+
+/// Examines `examinee` on `test`, its thresholds found on `validation` for `per_hour` false alarms.
+///
+/// # Errors
+/// Where a part is too small or holds no numbers.
+pub fn examine(
+    name: &str,
+    examinee: &Examinee,
+    (validation, test): (&Dataset, &Dataset),
+    (window, interval_s): (usize, f64),
+    per_hour: f64,
+) -> Result<Examination> {
+    let held_out = examinee.all_scores(validation)?;
+    let scores = examinee.all_scores(test)?;
+    let quiet: HealthyScores = healthy(validation, &held_out, interval_s);
+    let threshold = quiet.operating_point(per_hour)?.threshold;
+    let cut = best_cut(&decisions(validation, &held_out, window));
+    let all = decisions(test, &scores, window);
+    let accuracy = |keep: &dyn Fn(&Decision) -> bool| {
+        let kept = all.iter().filter(|d| keep(d));
+        BalancedAccuracy::of(kept.map(|d| (d.score > cut, d.faulty)))
+    };
+    let mut classes: Vec<i64> = all.iter().map(|d| d.cn0_dbhz).collect();
+    classes.sort_unstable();
+    classes.dedup();
+    let plain: Vec<(f64, bool)> = all.iter().map(|d| (d.score, d.faulty)).collect();
+    let mut by_scenario: BTreeMap<u32, Vec<(f64, bool)>> = BTreeMap::new();
+    for d in &all {
+        by_scenario
+            .entry(d.scenario)
+            .or_default()
+            .push((d.score, d.faulty));
+    }
+    let groups: Vec<_> = by_scenario.into_values().collect();
+    let band = Roc::area_band(&groups, ROUNDS, &mut ChaCha8Rng::seed_from_u64(1));
+    Ok(Examination {
+        name: name.to_owned(),
+        area: Roc::new(&plain).map_or(f64::NAN, |roc| roc.area()),
+        area_band: band.unwrap_or((f64::NAN, f64::NAN)),
+        area_by_fault: area_by_fault(test, &scores, window),
+        balanced: accuracy(&|_| true),
+        balanced_steady: accuracy(&|d| !d.new),
+        balanced_by_cn0: classes
+            .iter()
+            .map(|c| (*c, accuracy(&|d| d.cn0_dbhz == *c)))
+            .collect(),
+        threshold,
+        false_alarms: healthy(test, &scores, interval_s).rate(threshold),
+        faults: on_faults(test, &scores, threshold),
+    })
+}
+
+fn decisions(data: &Dataset, scores: &[Vec<Option<f64>>], window: usize) -> Vec<Decision> {
+    let ends = choose(data, window, EXAMINED, 2);
+    let decide = |end: &fault_ml::learned::WindowEnd| {
+        let sequence = data.sequences.get(end.sequence)?;
+        let step = sequence.steps.get(end.newest)?;
+        Some(Decision {
+            scenario: sequence.scenario,
+            score: (*scores.get(end.sequence)?.get(end.newest)?)?,
+            faulty: step.label.is_faulty(),
+            new: sequence
+                .since_change(end.newest)
+                .is_some_and(|n| n < window),
+            cn0_dbhz: cn0_class_dbhz(step.step.cn0_dbhz),
+        })
+    };
+    ends.iter().filter_map(decide).collect()
+}
+
+/// The threshold of the largest balanced accuracy.
+fn best_cut(decisions: &[Decision]) -> f64 {
+    let plain: Vec<(f64, bool)> = decisions.iter().map(|d| (d.score, d.faulty)).collect();
+    let roc = Roc::new(&plain);
+    let points = roc.iter().flat_map(|roc| roc.points());
+    let best = points
+        .max_by(|a, b| (a.detections - a.false_alarms).total_cmp(&(b.detections - b.false_alarms)));
+    best.map_or(0.0, |point| point.threshold)
+}
+
+fn area_by_fault(
+    data: &Dataset,
+    scores: &[Vec<Option<f64>>],
+    window: usize,
+) -> BTreeMap<String, f64> {
+    let mut faulty: BTreeMap<String, Vec<f64>> = BTreeMap::new();
+    let mut quiet = Vec::new();
+    for end in choose(data, window, EXAMINED, 2) {
+        let sequence = &data.sequences[end.sequence];
+        let Some(score) = scores[end.sequence][end.newest] else {
+            continue;
+        };
+        if sequence.steps[end.newest].label.is_faulty() {
+            faulty
+                .entry(sequence.fault.clone())
+                .or_default()
+                .push(score);
+        } else {
+            quiet.push(score);
+        }
+    }
+    let area = |(fault, scores): (String, Vec<f64>)| {
+        let mut all: Vec<(f64, bool)> = scores.into_iter().map(|s| (s, true)).collect();
+        all.extend(quiet.iter().map(|s| (*s, false)));
+        (fault, Roc::new(&all).map_or(f64::NAN, |roc| roc.area()))
+    };
+    faulty.into_iter().map(area).collect()
+}
+
+/// The first alarm of every fault.
+fn on_faults(
+    data: &Dataset,
+    scores: &[Vec<Option<f64>>],
+    threshold: f64,
+) -> BTreeMap<String, OnFault> {
+    // A channel may fall into several sequences: the fault is one.
+    let mut first: BTreeMap<(String, u32), (f64, Option<f64>)> = BTreeMap::new();
+    for (sequence, scores) in data.sequences.iter().zip(scores) {
+        for (step, score) in sequence.steps.iter().zip(scores) {
+            if !step.label.is_faulty() {
+                continue;
+            }
+            let key = (sequence.fault.clone(), sequence.scenario);
+            let entry = first.entry(key).or_insert((step.time_s, None));
+            if entry.1.is_none() && score.is_some_and(|s| s > threshold) {
+                entry.1 = Some(step.time_s - entry.0);
+            }
+        }
+    }
+    let mut faults: BTreeMap<String, OnFault> = BTreeMap::new();
+    for ((fault, _), (_, delay_s)) in first {
+        let on = faults.entry(fault).or_default();
+        on.faults += 1;
+        on.delays_s.extend(delay_s);
+    }
+    faults
+}
+
+impl Examination {
+    /// All figures.
+    #[must_use]
+    pub fn figures(&self) -> Value {
+        let accuracy = |b: &BalancedAccuracy| json!(b.value());
+        let faults: serde_json::Map<String, Value> = self
+            .faults
+            .iter()
+            .map(|(fault, on)| {
+                let share = on.detected();
+                let delay = Some(on.median_delay_s()).filter(|d| d.is_finite());
+                let value = json!({
+                    "faults": on.faults, "detected": share.value, "detected_95": [share.low, share.high],
+                    "median_delay_s": delay, "area": self.area_by_fault.get(fault),
+                });
+                (fault.clone(), value)
+            })
+            .collect();
+        let classes: BTreeMap<String, Value> = self
+            .balanced_by_cn0
+            .iter()
+            .map(|(c, b)| (c.to_string(), accuracy(b)))
+            .collect();
+        json!({
+            "area": self.area, "area_95": [self.area_band.0, self.area_band.1],
+            "balanced_accuracy": accuracy(&self.balanced),
+            "balanced_accuracy_steady": accuracy(&self.balanced_steady),
+            "balanced_accuracy_by_cn0_dbhz": classes,
+            "threshold": self.threshold,
+            "false_alarms_per_hour": self.false_alarms.per_hour,
+            "false_alarms_per_hour_95": [self.false_alarms.low, self.false_alarms.high],
+            "faults": faults,
+        })
+    }
+}

@@ -1,0 +1,56 @@
+//! Many runs of a receiver, and what its monitors would have seen in them.
+
+use anyhow::Result;
+use fault_ml::learned::Dataset;
+use receiver::pipeline::{Settings, VectorSettings};
+
+use super::label::labelled;
+use super::plan::Plan;
+use crate::judged;
+use crate::scenario::built::Scenario;
+use crate::scenario::make::Level;
+
+/// A receiver to learn from.
+pub trait Pupil: Sync {
+    /// Its settings for `scenario`; every update of its filter is to be reported.
+    fn settings(&self, scenario: &Scenario) -> Settings;
+}
+
+/// The receiver as it comes: updates 50 times a second, the innovation test excluding what it finds, so that
+/// one faulty channel does not spoil the others.
+#[derive(Debug, Clone, Copy)]
+pub struct Product;
+
+impl Pupil for Product {
+    fn settings(&self, scenario: &Scenario) -> Settings {
+        let vector = VectorSettings::default();
+        Settings {
+            rate_hz: 1.0 / vector.interval_s,
+            vector: Some(vector),
+            ..judged::settings(scenario)
+        }
+    }
+}
+
+/// Labelled steps of `plans`, each received by `pupil` at the correlator level.
+///
+/// # Errors
+/// Where a scenario cannot be made or a run fails.
+pub fn harvest(plans: &[Plan], seed: u64, pupil: &impl Pupil) -> Result<Dataset> {
+    let all = judged::in_parallel(plans.len(), |number| {
+        let plan = &plans[number];
+        let scenario = plan.scenario(seed)?;
+        let judged = judged::receive(&scenario, Level::Correlator, &pupil.settings(&scenario))?;
+        let elapsed_s = |time_s| scenario.elapsed_s(time_s);
+        let mut data = labelled(plan.number, &judged.channels, &scenario.accounts, elapsed_s);
+        for sequence in data.sequences.iter_mut().filter(|s| !s.fault.is_empty()) {
+            sequence.fault += plan.severity.suffix();
+        }
+        Ok(data)
+    })?;
+    let mut data = Dataset::default();
+    for part in all {
+        data.sequences.extend(part.sequences);
+    }
+    Ok(data)
+}

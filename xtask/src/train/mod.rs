@@ -1,0 +1,12 @@
+//! Training of channel monitors on made-up runs.
+
+pub mod command;
+pub mod evaluate;
+pub mod fit;
+pub mod harvest;
+pub mod label;
+pub mod paper;
+pub mod plan;
+pub mod scoring;
+
+pub use command::{Report, Trained, train};

@@ -1,0 +1,239 @@
+//! Accuracy by the number of innovations (Figure 5 of Jiang2017, Figure 6 of Zhu2020): a blocked channel, raw
+//! innovations, the receiver of the papers.
+
+use std::sync::Arc;
+
+use anyhow::Result;
+use fault_ml::learned::lstm::LstmTraining;
+use fault_ml::learned::svm::SvmTraining;
+use fault_ml::learned::{
+    Calibration, Card, Dataset, FORMAT, FeatureSet, LearnedModel, Mode, ModelKind, Network,
+    OperatingPoint, Split, VERSION, Windows, choose, cn0_class_dbhz, features, healthy_scaler,
+};
+use fault_ml::metrics::BalancedAccuracy;
+use gnss_nav::tracking_noise;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use receiver::pipeline::{MeasurementNoise, Settings};
+use serde_json::json;
+
+use super::label::labelled;
+use super::scoring::Examinee;
+use crate::judged;
+use crate::reproduce::jiang2017::receivers::{INTERVAL_S, Variant};
+use crate::scenario::built::Scenario;
+use crate::scenario::catalogue;
+use crate::scenario::make::Level;
+
+/// Classes of C/N0 before the front end, dB-Hz.
+pub const CLASSES_DBHZ: [i64; 4] = [30, 35, 40, 45];
+/// Numbers of innovations.
+pub const LENGTHS: [usize; 7] = [5, 10, 20, 30, 50, 75, 100];
+/// Early to late of the papers' receivers, chips.
+const SPACING_CHIPS: f64 = 1.0;
+/// Signal of a run and onset of the blockage, s.
+const DURATION_S: f64 = 19.0;
+const ONSET_S: (f64, f64) = (12.0, 15.0);
+/// Every run begins at this C/N0, dB-Hz, and falls to its class between these times, s: below 35 dB-Hz it takes
+/// long before the filter can take over, which is not what is studied.
+const BEGIN_DBHZ: i64 = 45;
+const FALL_S: (f64, f64) = (8.0, 9.0);
+
+/// A scenario of the study: a flight of the papers' with one satellite blocked.
+///
+/// # Errors
+/// Where it cannot be made.
+pub fn scenario(cn0_dbhz: i64, seed: u64) -> Result<Scenario> {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let victims = [7, 8, 24, 17, 19, 11, 20];
+    let victim = victims[random.random_range(0..victims.len())];
+    let begin_s = random.random_range(ONSET_S.0..ONSET_S.1);
+    let fault =
+        format!("fault=[{{ kind = 'blocked', sat = 'G{victim:02}', begin_s = {begin_s:.3} }}]");
+    let overrides = [
+        format!(
+            "cn0={{ fixed_dbhz = {cn0_dbhz}, schedule = [[0, {excess}], [{from}, {excess}], [{to}, 0]] }}",
+            excess = BEGIN_DBHZ - cn0_dbhz,
+            from = FALL_S.0,
+            to = FALL_S.1,
+        ),
+        format!("duration_s={DURATION_S:?}"),
+        fault,
+    ];
+    Scenario::new(
+        &catalogue::find("jiang2017-1")?.with(&overrides)?,
+        Some(seed),
+    )
+}
+
+/// The papers' receiver, every update reported, its noise that of the class, the innovation test excluding.
+#[must_use]
+pub fn settings(scenario: &Scenario, cn0_dbhz: i64) -> Settings {
+    let mut settings = Variant::PaperExcluding.settings(scenario);
+    settings.rate_hz = 1.0 / INTERVAL_S;
+    let cn0_dbhz = cn0_dbhz as f64;
+    if let Some(vector) = &mut settings.vector {
+        vector.noise = MeasurementNoise::Fixed {
+            pseudorange_m2: tracking_noise::code_variance_m2(cn0_dbhz, INTERVAL_S, SPACING_CHIPS),
+            range_rate_m2_s2: tracking_noise::sum_pair_rate_variance_m2_s2(cn0_dbhz, INTERVAL_S),
+        };
+    }
+    settings
+}
+
+/// Labelled steps of `seeds` runs of every class, made at `level`; the scenario's number tells the class.
+///
+/// # Errors
+/// Where a run fails.
+pub fn harvest(seeds: usize, first_seed: u64, level: Level) -> Result<Dataset> {
+    let all = judged::in_parallel(CLASSES_DBHZ.len() * seeds, |number| {
+        let cn0_dbhz = CLASSES_DBHZ[number % CLASSES_DBHZ.len()];
+        let scenario = scenario(cn0_dbhz, first_seed + number as u64)?;
+        let judged = judged::receive(&scenario, level, &settings(&scenario, cn0_dbhz))?;
+        let elapsed_s = |time_s| scenario.elapsed_s(time_s);
+        let mut data = labelled(
+            number as u32,
+            &judged.channels,
+            &scenario.accounts,
+            elapsed_s,
+        );
+        for sequence in &mut data.sequences {
+            sequence.steps.retain(|step| step.time_s >= FALL_S.1);
+        }
+        data.sequences.retain(|sequence| !sequence.steps.is_empty());
+        // Classes are those of the scenario; a blocked channel has no C/N0 of its own.
+        for step in data.sequences.iter_mut().flat_map(|s| &mut s.steps) {
+            step.step.cn0_dbhz = cn0_dbhz as f64;
+        }
+        Ok(data)
+    })?;
+    Ok(Dataset {
+        sequences: all.into_iter().flat_map(|part| part.sequences).collect(),
+    })
+}
+
+/// Accuracy of one model.
+#[derive(Debug, Clone)]
+pub struct Accuracy {
+    /// Over all windows.
+    pub all: BalancedAccuracy,
+    /// Without those in which the channel became faulty.
+    pub steady: BalancedAccuracy,
+    /// By class of C/N0, dB-Hz.
+    pub by_class: Vec<(i64, BalancedAccuracy)>,
+    /// The same without those in which the channel became faulty.
+    pub steady_by_class: Vec<(i64, BalancedAccuracy)>,
+}
+
+impl Accuracy {
+    /// Balanced accuracy in class number `index`, over all windows or those in which nothing changes; zero where
+    /// there is no such class.
+    #[must_use]
+    pub fn of_class(&self, index: usize, steady: bool) -> f64 {
+        let classes = if steady {
+            &self.steady_by_class
+        } else {
+            &self.by_class
+        };
+        classes
+            .get(index)
+            .map_or(0.0, |(_, accuracy)| accuracy.value())
+    }
+}
+
+/// Windows trained on.
+const TRAINED_ON: usize = 3000;
+
+/// Trains a model of `kind` on windows of `length` raw innovations.
+///
+/// # Errors
+/// Where there is too little to learn from.
+pub fn fit(kind: ModelKind, length: usize, split: &Split, seed: u64) -> Result<LearnedModel> {
+    let set = FeatureSet::Paper;
+    let rows = features(&split.training, set)?;
+    let scaler = healthy_scaler(&split.training, &rows)?;
+    let gather = |data: &Dataset, rows: &[Vec<_>], count| {
+        let ends = choose(data, length, count, seed);
+        Windows::gather(data, rows, &scaler, length, &ends)
+    };
+    let training = gather(&split.training, &rows, TRAINED_ON);
+    let network = match kind {
+        ModelKind::Svm => {
+            let settings = SvmTraining {
+                largest: usize::MAX,
+                ..SvmTraining::default()
+            };
+            Network::Svm(settings.fit(&training)?.predictor)
+        }
+        ModelKind::Lstm => {
+            let held_out = features(&split.validation, set)?;
+            let validation = gather(&split.validation, &held_out, TRAINED_ON / 4);
+            let settings = LstmTraining {
+                mode: Mode::Window,
+                epochs: 15,
+                seed,
+                ..LstmTraining::default()
+            };
+            Network::Lstm(settings.fit(&training, &validation)?.cell)
+        }
+    };
+    let card = Card {
+        format: FORMAT.to_owned(),
+        version: VERSION,
+        kind,
+        features: set,
+        window: length,
+        mode: Mode::Window,
+        interval_s: INTERVAL_S,
+        decide_every: 1,
+        calibration: Calibration::NONE,
+        operating_point: OperatingPoint {
+            threshold: 0.0,
+            false_alarms_per_hour: 1.0,
+            channel_hours: 0.0,
+            extrapolated: true,
+        },
+        weights_fnv1a: String::new(),
+        training: json!({ "paper": true, "seed": seed }),
+    };
+    Ok(LearnedModel::new(card, scaler, network)?)
+}
+
+/// How `model` fares on every window of `test`: a raw score above zero is faulty, as it was trained.
+///
+/// # Errors
+/// Where a step holds no numbers.
+pub fn accuracy(model: &LearnedModel, test: &Dataset) -> Result<Accuracy> {
+    let length = model.card().window;
+    let scores = Examinee::Learned(Arc::new(model.clone())).all_scores(test)?;
+    let mut all = Vec::new();
+    for (sequence, scores) in test.sequences.iter().zip(scores) {
+        let mut since = usize::MAX;
+        let mut before = None;
+        for (step, score) in sequence.steps.iter().zip(scores) {
+            let changed = before.is_some_and(|label| label != step.label);
+            since = if changed { 0 } else { since.saturating_add(1) };
+            before = Some(step.label);
+            let class = cn0_class_dbhz(step.step.cn0_dbhz);
+            all.extend(score.map(|s| (s > 0.0, step.label.is_faulty(), since < length, class)));
+        }
+    }
+    let of = |class: Option<i64>, steady: bool| {
+        let kept = all
+            .iter()
+            .filter(|(_, _, new, c)| class.is_none_or(|k| k == *c) && !(steady && *new));
+        BalancedAccuracy::of(kept.map(|(found, truth, _, _)| (*found, *truth)))
+    };
+    Ok(Accuracy {
+        all: of(None, false),
+        steady: of(None, true),
+        by_class: CLASSES_DBHZ
+            .iter()
+            .map(|c| (*c, of(Some(*c), false)))
+            .collect(),
+        steady_by_class: CLASSES_DBHZ
+            .iter()
+            .map(|c| (*c, of(Some(*c), true)))
+            .collect(),
+    })
+}
