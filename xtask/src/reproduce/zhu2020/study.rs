@@ -13,7 +13,7 @@ use crate::reproduce::jiang2017::receivers::Variant;
 use crate::scenario::built::Scenario;
 use crate::scenario::catalogue;
 use crate::scenario::make::Level;
-use crate::train::fit::calibrated;
+use crate::train::fit::{calibrated, with_threshold};
 use crate::train::paper::{self, Accuracy};
 
 /// First seeds of what is learned from and of what is judged by: no scenario is in both.
@@ -154,7 +154,8 @@ fn flights(split: &Split, level: Level) -> Result<Vec<Flight>> {
     let scenario = Scenario::new(&catalogue::find("zhu2020")?, None)?;
     let trained = |kind, length| -> Result<LearnedModel> {
         let model = paper::fit(kind, length, split, 1)?;
-        calibrated(model, &split.validation, FLIGHT_ALARMS_PER_HOUR)
+        let model = calibrated(model, &split.validation)?;
+        with_threshold(model, &split.validation, FLIGHT_ALARMS_PER_HOUR)
     };
     let monitors = [
         ("without detection", None),
