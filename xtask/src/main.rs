@@ -93,7 +93,7 @@ enum Task {
         #[arg(long, value_name = "CSV")]
         save_data: Option<PathBuf>,
         /// Scenarios made and received
-        #[arg(long, value_name = "N", default_value_t = 400, value_parser = clap::value_parser!(u32).range(40..))]
+        #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u32).range(40..))]
         runs: u32,
         /// Folder of the model
         #[arg(long, value_name = "DIR", default_value = "assets/models")]

@@ -18,7 +18,7 @@ use crate::scenario::make::Level;
 /// Scenarios that training stops by, and calibration and evidence are chosen by, for each that is learned from.
 const VALIDATION_SHARE: f64 = 0.4;
 /// Healthy channel-hours of the first threshold.
-const CHANNEL_HOURS: f64 = 40.0;
+const CHANNEL_HOURS: f64 = 20.0;
 
 /// Which model is trained.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

@@ -104,7 +104,9 @@ pub fn examine(
     let held_out = examinee.all_scores(validation)?;
     let scores = examinee.all_scores(test)?;
     let alarms = examinee.all_scores(examined.unwatched)?;
-    let cut = best_cut(&decisions(validation, &held_out, window));
+    let held_out = decisions(validation, &held_out, window);
+    let plain: Vec<(f64, bool)> = held_out.iter().map(|d| (d.score, d.faulty)).collect();
+    let cut = best_cut(&plain);
     let all = decisions(test, &scores, window);
     let accuracy = |keep: &dyn Fn(&Decision) -> bool| {
         let kept = all.iter().filter(|d| keep(d));
@@ -157,10 +159,10 @@ fn decisions(data: &Dataset, scores: &[Vec<Option<f64>>], window: usize) -> Vec<
     ends.iter().filter_map(decide).collect()
 }
 
-/// The threshold of the largest balanced accuracy.
-fn best_cut(decisions: &[Decision]) -> f64 {
-    let plain: Vec<(f64, bool)> = decisions.iter().map(|d| (d.score, d.faulty)).collect();
-    let roc = Roc::new(&plain);
+/// The threshold of the largest balanced accuracy over scores and whether they are of faulty windows.
+#[must_use]
+pub fn best_cut(scores: &[(f64, bool)]) -> f64 {
+    let roc = Roc::new(scores);
     let points = roc.iter().flat_map(|roc| roc.points());
     let best = points
         .max_by(|a, b| (a.detections - a.false_alarms).total_cmp(&(b.detections - b.false_alarms)));

@@ -20,7 +20,7 @@ use super::scoring::{Examinee, add_healthy};
 /// False alarms of a channel an hour that thresholds are found for.
 pub const FALSE_ALARMS_PER_HOUR: f64 = 0.01;
 /// Offsets of the evidence that are tried, log-odds.
-const OFFSETS: [f64; 5] = [0.0, 1.0, 2.0, 3.0, 4.0];
+const OFFSETS: [f64; 4] = [0.0, 1.0, 2.0, 3.0];
 /// A fault that is not found counts as found after so long, s.
 const MISSED_S: f64 = 10.0;
 /// Windows that the calibration is fitted to.
@@ -64,10 +64,14 @@ impl Recipe {
             mode: Mode::Window,
             decide_every: 5,
             interval_s: 0.02,
-            windows: 6000,
+            windows: 4000,
             length: 5,
             svm: SvmTraining::default(),
-            lstm: LstmTraining::default(),
+            lstm: LstmTraining {
+                epochs: 12,
+                patience: 4,
+                ..LstmTraining::default()
+            },
             seed: 1,
         };
         match kind {
@@ -76,8 +80,8 @@ impl Recipe {
                 window: 50,
                 mode: Mode::Streaming,
                 decide_every: 1,
-                windows: 8000,
-                length: 150,
+                windows: 5000,
+                length: 100,
                 ..base
             },
         }

@@ -27,7 +27,7 @@ const INTERVAL_S: f64 = 0.02;
 /// Steps of the windows that areas are found on.
 const WINDOW: usize = 50;
 /// Scenarios learned from, that the cut between windows is found beside.
-const LEARNED_FROM: u32 = 160;
+const LEARNED_FROM: u32 = 200;
 
 /// One monitor.
 #[derive(Debug, Clone)]
