@@ -141,8 +141,9 @@ impl Accuracy {
     }
 }
 
-/// Windows trained on.
-const TRAINED_ON: usize = 2400;
+/// Windows that a layer is trained on, and a machine: the cost of its kernel grows with their square.
+const LAYER_WINDOWS: usize = 2400;
+const MACHINE_WINDOWS: usize = 1200;
 /// Passes over them at most.
 const PASSES: usize = 12;
 /// One window in so many is judged; a number that divides no other period here.
@@ -194,7 +195,11 @@ pub fn fit(kind: ModelKind, length: usize, split: &Split, seed: u64) -> Result<L
         let ends = choose(data, length, count, seed);
         Windows::gather(data, rows, &scaler, length, &ends)
     };
-    let training = gather(&split.training, &rows, TRAINED_ON);
+    let count = match kind {
+        ModelKind::Svm => MACHINE_WINDOWS,
+        ModelKind::Lstm => LAYER_WINDOWS,
+    };
+    let training = gather(&split.training, &rows, count);
     let network = match kind {
         ModelKind::Svm => {
             let settings = SvmTraining {
@@ -205,7 +210,7 @@ pub fn fit(kind: ModelKind, length: usize, split: &Split, seed: u64) -> Result<L
         }
         ModelKind::Lstm => {
             let held_out = features(&split.validation, set)?;
-            let validation = gather(&split.validation, &held_out, TRAINED_ON / 4);
+            let validation = gather(&split.validation, &held_out, LAYER_WINDOWS / 4);
             let settings = LstmTraining {
                 mode: Mode::Window,
                 epochs: PASSES,
