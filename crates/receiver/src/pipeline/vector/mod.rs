@@ -3,18 +3,21 @@
 //! This is the one edge along which data goes up: what each channel is steered to follows from the
 //! state of the filter, one epoch later.
 
+mod acceleration;
 mod bit_slip;
 mod clock_step;
 mod filter;
 mod monitors;
 mod report;
+mod restart;
 mod settings;
 mod steering;
 mod watch;
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::BTreeMap;
 
 use fault_ml::learned::ChannelStep;
+use gnss_nav::coarse_time::SnapshotSolution;
 use gnss_nav::filter::{
     Advice, Disposition, EpochGeometry, FaultLogic, FaultThresholds, Innovations, NavFilter,
     Observable, SatelliteInnovation, SkipReason, Update,
@@ -23,18 +26,17 @@ use gnss_nav::measurement::form;
 use gnss_nav::prediction::Expected;
 use gnss_nav::{
     EphemerisStore, GpsTime, Measurement, MeasurementModel, NavState, RawMeasurement, SatelliteId,
-    Solution, least_squares,
+    Solution,
 };
 use gnss_signal::tracking::{ChannelEpoch, Lock};
-use nalgebra::Vector3;
+use nalgebra::{Vector3, Vector4};
 
-use super::navigator::EXCLUSION_FALSE_ALARM;
 use super::slot::Slot;
 use crate::ReceiverError;
 use crate::record::EventKind;
 
-use clock_step::ClockStep;
-use filter::{filter, from_solution};
+use acceleration::Velocities;
+use filter::from_solution;
 pub(super) use monitors::Monitor;
 use monitors::deviations;
 pub(super) use report::observations;
@@ -48,24 +50,32 @@ const NEEDED: usize = 4;
 const STALE_S: f64 = 0.1;
 /// Healthy for so long, s, a satellite is believed again.
 const READMIT_S: f64 = 2.0;
-/// Time over which the receiver's acceleration is a mean, s: long enough that noise of velocities does
-/// not matter over the age of a measurement.
-const ACCELERATION_SPAN_S: f64 = 0.2;
 /// A message tells another time than the filter's when they are this far apart, s: half a code period.
 const TIME_DISAGREES_S: f64 = 0.5e-3;
 /// So many messages are believed rather than the filter: one may be damaged.
 const CONTRADICTING: usize = 2;
-/// An acceleration below two deviations of its noise is none: fed back, noise would grow.
-const SIGNIFICANT_SIGMAS2: f64 = 4.0;
+/// Weak signals may take longer than this to show where their bits begin, s.
+const BITS_PATIENCE_S: f64 = 1.0;
 /// Past this deviation of a predicted range, m, a signal is likely to lie outside the taps: half a
 /// chip.
 const LOST_M: f64 = 150.0;
+
+/// How well the receiver's clock is known.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Time {
+    /// To a small part of a code period.
+    Exact,
+    /// As well as a snapshot tells: before any bit boundary is known.
+    Coarse,
+}
 
 /// What becomes of vector tracking after an epoch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Outlook {
     /// It goes on.
     Goes,
+    /// Enough bit boundaries are known for an exact time, which it begins anew with.
+    Exact,
     /// The prediction no longer reaches the signals: they have to be found again.
     Lost,
     /// Most channels contradict the filter and no solution reconciles them: not even the time is
@@ -132,12 +142,16 @@ pub(super) struct VectorTracking {
     geometry: Option<EpochGeometry>,
     /// Channels whose message tells another time, at the last epoch.
     contradicting: usize,
-    velocities: VecDeque<(GpsTime, Vector3<f64>)>,
+    velocities: Velocities,
     acceleration_mps2: Vector3<f64>,
     /// The last epoch.
     pub(super) tick: u64,
+    started: GpsTime,
     /// When enough satellites for a fix were last used.
     fixed: GpsTime,
+    /// What an error of the coarse time makes of position (ECEF) and clock bias, m, one deviation; `None`
+    /// where time is exact.
+    coarse_shift_m: Option<Vector4<f64>>,
     pub(super) outlook: Outlook,
 }
 
@@ -163,13 +177,48 @@ impl VectorTracking {
             watches: BTreeMap::new(),
             geometry: None,
             contradicting: 0,
-            velocities: VecDeque::new(),
+            velocities: Velocities::default(),
             acceleration_mps2: Vector3::zeros(),
             tick: around.tick,
+            started: solution.gps_time(),
             fixed: solution.gps_time(),
+            coarse_shift_m: None,
             outlook: Outlook::Goes,
             settings: settings.clone(),
         })
+    }
+
+    /// Starts from a snapshot of what channels said before their bit boundaries were known.
+    ///
+    /// # Errors
+    /// As [`Self::start`].
+    pub(super) fn start_early(
+        around: &Surroundings,
+        snapshot: &SnapshotSolution,
+        epochs: &[(SatelliteId, ChannelEpoch)],
+        model: MeasurementModel,
+        settings: &VectorSettings,
+        monitors: Vec<Monitor>,
+    ) -> Result<Self, ReceiverError> {
+        let state = NavState::from(&snapshot.solution);
+        let raw = epochs.iter().filter_map(|(satellite, epoch)| {
+            let ephemeris = around.store.select(*satellite, state.time)?;
+            let expected = state.expect(ephemeris, around.receive_time, &model).ok()?;
+            steering::raw_measurement(epoch, *satellite, around.receive_time, &expected, settings)
+        });
+        let raw: Vec<RawMeasurement> = raw.collect();
+        let started = Self::start(around, &snapshot.solution, &raw, model, settings, monitors)?;
+        Ok(Self {
+            coarse_shift_m: Some(snapshot.time_shift_m),
+            ..started
+        })
+    }
+
+    pub(super) const fn time(&self) -> Time {
+        match self.coarse_shift_m {
+            Some(_) => Time::Coarse,
+            None => Time::Exact,
+        }
     }
 
     const fn model(&self) -> &MeasurementModel {
@@ -198,7 +247,10 @@ impl VectorTracking {
     ) -> Result<Epoch, ReceiverError> {
         let to = self.state().gps_time(around.receive_time);
         let interval_s = to - self.state().time;
-        self.acceleration_mps2 = self.mean_acceleration();
+        let measured = self.fixed == self.state().time;
+        self.acceleration_mps2 = self
+            .velocities
+            .mean_acceleration_mps2(&self.filter.covariance(), measured);
         self.filter.predict(to)?;
         self.filter
             .accelerate(&self.acceleration_mps2, interval_s)?;
@@ -217,14 +269,25 @@ impl VectorTracking {
         if self.contradicting >= CONTRADICTING {
             self.outlook = Outlook::Contradicted;
         }
+        if self.time() == Time::Coarse && self.bits_tell_time(slots) {
+            self.outlook = Outlook::Exact;
+        }
         let channels = slots.iter().map(|slot| &slot.channel);
         if let Some(size_m) = bit_slip::find(channels) {
             self.outlook = Outlook::Slipped;
             epoch.events.push((None, EventKind::ClockStep { size_m }));
         }
-        self.remember_velocity();
+        self.velocities.remember(self.filter.state());
         self.steer(around, &epoch.members, slots);
         Ok(epoch)
+    }
+
+    /// Whether bit boundaries can take the place of the coarse time: all are known, or enough of them and
+    /// the others take long.
+    fn bits_tell_time(&self, slots: &[Slot]) -> bool {
+        let known = slots.iter().filter(|slot| slot.bits_found).count();
+        let age_s = self.state().time - self.started;
+        known >= NEEDED && (known == slots.len() || age_s > BITS_PATIENCE_S)
     }
 
     /// What a steered channel measured.
@@ -267,33 +330,6 @@ impl VectorTracking {
             range_rate_mps: raw.range_rate_mps + change_mps,
             ..raw
         }
-    }
-
-    /// Mean acceleration of the receiver over the last epochs, ECEF, m/s^2, as far as it stands out of
-    /// the noise of velocities; none where the last epoch was not measured.
-    fn mean_acceleration(&self) -> Vector3<f64> {
-        let measured = self.fixed == self.state().time;
-        let Some((since, velocity_mps)) = self.velocities.front().filter(|_| measured) else {
-            return Vector3::zeros();
-        };
-        let span_s = self.state().time - *since;
-        if span_s < ACCELERATION_SPAN_S / 2.0 {
-            return Vector3::zeros();
-        }
-        let mean = (self.state().velocity_ecef_mps - velocity_mps) / span_s;
-        let covariance = self.filter.covariance();
-        let variance: f64 = [1, 3, 5].iter().map(|i| covariance[(*i, *i)]).sum();
-        let noise = 2.0 * variance / (span_s * span_s);
-        mean * (1.0 - SIGNIFICANT_SIGMAS2 * noise / mean.norm_squared()).max(0.0)
-    }
-
-    /// Keeps the velocities that [`Self::mean_acceleration`] rests on.
-    fn remember_velocity(&mut self) {
-        let state = *self.state();
-        self.velocities
-            .push_back((state.time, state.velocity_ecef_mps));
-        self.velocities
-            .retain(|(time, _)| state.time - *time <= ACCELERATION_SPAN_S);
     }
 
     fn watch(&mut self, satellite: SatelliteId) -> &mut Watch {
@@ -348,20 +384,6 @@ impl VectorTracking {
         if (position / 3.0 + covariance[(6, 6)]).sqrt() > LOST_M {
             self.outlook = Outlook::Lost;
         }
-        Ok(())
-    }
-
-    /// Follows a step of the receiver's clock.
-    fn step_clock(&mut self, step: &ClockStep, epoch: &mut Epoch) -> Result<(), ReceiverError> {
-        let mut state = *self.state();
-        let mut covariance = self.filter.covariance();
-        state.clock_bias_m += step.size_m;
-        covariance[(6, 6)] += step.variance_m2;
-        self.filter = filter(state, covariance, &self.model, &self.settings)?;
-        let kind = EventKind::ClockStep {
-            size_m: step.size_m,
-        };
-        epoch.events.push((None, kind));
         Ok(())
     }
 
@@ -450,54 +472,8 @@ impl VectorTracking {
         }
     }
 
-    /// Starts anew from least squares where that is consistent.
-    fn reset(
-        &mut self,
-        measurements: &[Measurement],
-        channels: usize,
-        epoch: &mut Epoch,
-    ) -> Result<(), ReceiverError> {
-        let solved = least_squares::solve_with_exclusion(
-            measurements,
-            &self.model,
-            &self.state().position_ecef_m,
-            EXCLUSION_FALSE_ALARM,
-        );
-        self.faults.clear();
-        let consistent = |s: &Solution| s.consistency == least_squares::Consistency::Passed;
-        let Some(solution) = solved.ok().filter(consistent) else {
-            self.outlook = Outlook::Contradicted;
-            return Ok(());
-        };
-        let kind = EventKind::FilterReset { channels };
-        epoch.events.push((None, kind));
-        self.filter = from_solution(&solution, measurements, &self.model, &self.settings)?;
-        self.watches.clear();
-        self.velocities.clear();
-        Ok(())
-    }
-
     /// Whether the position rests on measurements of this epoch or shortly before.
     pub(super) fn is_fixed(&self) -> bool {
         self.state().time - self.fixed < STALE_S
-    }
-
-    /// Takes another model of the delays, and moves to where it puts the same pseudoranges.
-    fn remodel(
-        &mut self,
-        model: MeasurementModel,
-        measurements: &[Measurement],
-    ) -> Result<(), ReceiverError> {
-        let covariance = self.filter.covariance();
-        let before = self.filter.innovations(measurements)?;
-        self.model = model;
-        self.filter = filter(*self.state(), covariance, &model, &self.settings)?;
-        if let Ok(shift) = self.filter.innovations(measurements)?.shift_from(&before) {
-            let mut state = *self.state();
-            state.position_ecef_m += shift.xyz();
-            state.clock_bias_m += shift.w;
-            self.filter = filter(state, covariance, &model, &self.settings)?;
-        }
-        Ok(())
     }
 }
