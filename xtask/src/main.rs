@@ -15,7 +15,7 @@ use xtask::scenario::make::Level;
 use xtask::tidy::{Severity, tidy, workspace_root};
 use xtask::train::{Trained, command as training};
 use xtask::validate::threshold::Thresholds;
-use xtask::validate::{consistency, front_ends, levels, sensitivity, starts};
+use xtask::validate::{consistency, front_ends, levels, monitors, sensitivity, starts};
 
 #[derive(Debug, Parser)]
 #[command(
@@ -81,19 +81,19 @@ enum Task {
         #[arg(long, value_name = "DIR", default_value = "reproduced")]
         out: PathBuf,
     },
-    /// Train a monitor on made-up runs, examine it beside the innovation test, write model and card
+    /// Train a monitor on made-up runs, write model and card
     Train {
         /// Which monitor
         #[arg(value_enum)]
         monitor: Trained,
-        /// Labelled steps (CSV, as --save-data writes them) in place of runs
-        #[arg(long, value_name = "CSV", conflicts_with = "runs")]
+        /// Learn from these labelled steps (CSV, as --save-data writes them); choices are made by runs all the same
+        #[arg(long, value_name = "CSV")]
         data: Option<PathBuf>,
         /// Also write the labelled steps
         #[arg(long, value_name = "CSV")]
         save_data: Option<PathBuf>,
         /// Scenarios made and received
-        #[arg(long, value_name = "N", default_value_t = 160, value_parser = clap::value_parser!(u32).range(40..))]
+        #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u32).range(40..))]
         runs: u32,
         /// Folder of the model
         #[arg(long, value_name = "DIR", default_value = "assets/models")]
@@ -142,6 +142,21 @@ enum Validation {
         /// How many
         #[arg(long, value_name = "N", default_value_t = 100)]
         runs: u16,
+    },
+    /// What the channel monitors find and how often they are wrong, at one rate of false alarms
+    Monitors {
+        /// Folder of the models
+        #[arg(long, value_name = "DIR", default_value = "assets/models")]
+        models: PathBuf,
+        /// Healthy channel-hours: thresholds are found in one half and false alarms counted in the other
+        #[arg(long, value_name = "H", default_value_t = 2000.0)]
+        hours: f64,
+        /// Scenarios with faults
+        #[arg(long, value_name = "N", default_value_t = 400, value_parser = clap::value_parser!(u32).range(40..))]
+        runs: u32,
+        /// Also write thresholds and figures into the models' cards
+        #[arg(long)]
+        write: bool,
     },
     /// The C/N0 at which channels are lost, steered by one filter against loops that share nothing
     Threshold {
@@ -194,6 +209,18 @@ fn validate(validation: &Validation, out: &mut impl Write) -> Result<ExitCode> {
         }
         Validation::Starts { runs } => {
             let table = starts::table(usize::from(*runs))?;
+            (table.to_string(), table.holds())
+        }
+        Validation::Monitors {
+            models,
+            hours,
+            runs,
+            write,
+        } => {
+            let table = monitors::table(models, *hours, *runs)?;
+            if *write {
+                table.write(models)?;
+            }
             (table.to_string(), table.holds())
         }
         Validation::Threshold { runs } => {
@@ -270,9 +297,9 @@ fn perform(task: Task) -> Result<ExitCode> {
             if let Some(path) = save_data {
                 training::write(&data, &path)?;
             }
-            let report = training::train(monitor, data)?;
-            report.write(&folder)?;
-            write!(out, "{report}")?;
+            let model = training::train(monitor, &data, runs)?;
+            training::write_model(&model, &folder)?;
+            write!(out, "{}", training::Summary(&model))?;
             Ok(ExitCode::SUCCESS)
         }
         Task::Tidy => {

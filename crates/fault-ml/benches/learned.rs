@@ -18,7 +18,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 const HIDDEN: usize = 32;
-const INPUTS: usize = 4;
+const INPUTS: usize = 10;
 const STEPS: usize = 50;
 
 fn uniform(count: usize, bound: f32) -> Vec<f32> {
@@ -77,7 +77,7 @@ fn layer(c: &mut Criterion) {
 }
 
 fn machine(c: &mut Criterion) {
-    for (dimensions, vectors) in [(60, 256), (120, 256), (60, 1700)] {
+    for (dimensions, vectors) in [(50, 256), (60, 1700)] {
         let support = uniform(dimensions * vectors, 2.0);
         let weights = uniform(vectors, 1.0);
         let gamma = 0.5 / dimensions as f32;

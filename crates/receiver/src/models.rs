@@ -37,18 +37,19 @@ mod tests {
     use super::*;
     use crate::pipeline::VectorSettings;
 
-    /// A healthy channel as the receiver shows it: over a million steps of made-up runs the innovations had 0.85
-    /// and 0.25 of their predicted deviations, the prompt power that of 10 ms within 0.8 dB.
+    /// A healthy channel as the receiver shows it: the prompt power is that of 10 ms within 0.8 dB.
     fn healthy(random: &mut ChaCha8Rng) -> ChannelStep {
         let mut normal = || random.sample::<f64, _>(StandardNormal);
+        let innovation = Innovation {
+            code_m: 0.85 * 5.0 * normal(),
+            code_sigma_m: 5.0,
+            rate_mps: 0.04 * normal(),
+            rate_sigma_mps: 0.05,
+        };
         ChannelStep {
             satellite: 7,
-            innovation: Innovation {
-                code_m: 0.85 * 5.0 * normal(),
-                code_sigma_m: 5.0,
-                rate_mps: 0.25 * 0.1 * normal(),
-                rate_sigma_mps: 0.1,
-            },
+            innovation,
+            given_others: innovation,
             cn0_dbhz: 42.0 + 0.1 * normal(),
             prompt_power: 0.01 * 10_f64.powf(4.2 + 0.08 * normal()),
         }

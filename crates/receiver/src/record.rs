@@ -1,5 +1,6 @@
 //! What the pipeline reports: plain records, written by sinks, never read back.
 
+use fault_ml::learned::ChannelStep;
 use gnss_nav::{Ephemeris, GpsTime, SatelliteId};
 pub use gnss_signal::tracking::Lock;
 use nalgebra::{Matrix3, SMatrix, Vector3};
@@ -230,6 +231,8 @@ pub struct ChannelRecord {
     pub innovation_code_m: Option<InnovationRecord>,
     /// Innovation of the range rate, m/s.
     pub innovation_rate_mps: Option<InnovationRecord>,
+    /// What its monitors were shown, where it is steered by the filter.
+    pub shown: Option<ChannelStep>,
     /// What the solution does with it.
     pub disposition: Disposition,
     /// Scores of the running monitors.

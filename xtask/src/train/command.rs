@@ -1,29 +1,24 @@
-//! `cargo xtask train`: runs, fits, examines, writes.
+//! `cargo xtask train`: runs, fits, calibrates, writes.
 
 use std::fmt;
 use std::fs;
 use std::io::{BufReader, BufWriter, Write as _};
 use std::path::Path;
-use std::sync::Arc;
 
 use anyhow::{Context, Result};
 use clap::ValueEnum;
-use fault_ml::learned::{Dataset, LearnedModel, ModelKind, Split, read_csv, write_csv};
-use fault_ml::{InnovationTest, InnovationTestSettings};
-use receiver::pipeline::VectorSettings;
+use fault_ml::learned::{Dataset, LearnedModel, ModelKind, read_csv, write_csv};
 use serde_json::json;
 
-use super::evaluate::{Examination, examine};
-use super::fit::{FALSE_ALARMS_PER_HOUR, Recipe};
-use super::harvest::{Product, harvest};
-use super::plan::{KINDS, Plan};
-use super::scoring::Examinee;
+use super::fit::{Recipe, with_evidence};
+use super::harvest::{Product, Unwatched, harvest};
+use super::plan::{KINDS, Plan, Series};
+use crate::scenario::make::Level;
 
-/// Seed of the scenarios.
-const SEED: u64 = 1;
-/// Parts of the scenarios held out for validation and test.
-const VALIDATION: f64 = 0.25;
-const TEST: f64 = 0.2;
+/// Scenarios that training stops by, and calibration and evidence are chosen by, for each that is learned from.
+const VALIDATION_SHARE: f64 = 0.4;
+/// Healthy channel-hours of the first threshold.
+const CHANNEL_HOURS: f64 = 20.0;
 
 /// Which model is trained.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -43,22 +38,47 @@ impl From<Trained> for ModelKind {
     }
 }
 
-/// A model and how it fared, beside the innovation test.
-#[derive(Debug, Clone)]
-pub struct Report {
-    /// The model.
-    pub model: LearnedModel,
-    /// Its figures, then those of the innovation test.
-    pub examinations: [Examination; 2],
+/// The first `count` of a series.
+#[must_use]
+pub fn plans(series: Series, count: u32) -> Vec<Plan> {
+    (0..count).map(|number| Plan::new(number, series)).collect()
 }
 
-/// Labelled steps of `runs` scenarios.
+/// Labelled steps of `runs` scenarios to learn from.
 ///
 /// # Errors
 /// Where a run fails.
 pub fn simulate(runs: u32) -> Result<Dataset> {
-    let plans: Vec<Plan> = (0..runs).map(|number| Plan::new(number, SEED)).collect();
-    harvest(&plans, SEED, &Product)
+    harvest(&plans(Series::TRAINING, runs), Level::Correlator, &Product)
+}
+
+/// Of `runs` scenarios learned from, the plans of those that choices are made by.
+#[must_use]
+pub fn validation(runs: u32) -> Vec<Plan> {
+    let count = (VALIDATION_SHARE * f64::from(runs)).ceil() as u32;
+    plans(Series::VALIDATION, count)
+}
+
+/// Trains the default model of a kind on `training`; choices are made by scenarios of another series, `runs` times
+/// 0.4.
+///
+/// # Errors
+/// Where there is too little to learn from or a run fails.
+pub fn train(trained: Trained, training: &Dataset, runs: u32) -> Result<LearnedModel> {
+    let plans = validation(runs);
+    let held_out = harvest(&plans, Level::Correlator, &Product)?;
+    let model = Recipe::product(trained.into()).fit(training, &held_out)?;
+    let unwatched = harvest(&plans, Level::Correlator, &Unwatched)?;
+    let model = with_evidence(model, &unwatched, CHANNEL_HOURS)?;
+    let mut card = model.card().clone();
+    card.training["data"] = json!({
+        "generator": "xtask::train::plan", "kinds": KINDS, "level": "correlator",
+        "training": { "seed": Series::TRAINING.seed, "week": Series::TRAINING.week,
+            "scenarios": training.scenarios().len(), "steps": training.steps() },
+        "validation": { "seed": Series::VALIDATION.seed, "week": Series::VALIDATION.week,
+            "scenarios": held_out.scenarios().len(), "healthy_channel_hours": card.operating_point.channel_hours },
+    });
+    Ok(model.with_card(card)?)
 }
 
 /// Labelled steps as `cargo xtask train data` has written them.
@@ -83,81 +103,52 @@ pub fn write(data: &Dataset, path: &Path) -> Result<()> {
         .with_context(|| format!("cannot write {}", path.display()))
 }
 
-/// Trains the default model of a kind and examines it, on parts of `data` that share no scenario.
+/// Writes weights and card of `model` into `folder`, named after the kind.
 ///
 /// # Errors
-/// Where there is too little to learn from.
-pub fn train(trained: Trained, data: Dataset) -> Result<Report> {
-    let split = data.split(VALIDATION, TEST, SEED);
-    report(&split, &Recipe::product(trained.into()))
-}
-
-/// Fits `recipe` to `split` and examines what comes of it.
-///
-/// # Errors
-/// Where there is too little to learn from.
-pub fn report(split: &Split, recipe: &Recipe) -> Result<Report> {
-    let model = recipe.fit(split)?;
-    let parts = (&split.validation, &split.test);
-    let shape = (recipe.window, recipe.interval_s);
-    let examined = |name: &str, examinee: &Examinee| {
-        examine(name, examinee, parts, shape, FALSE_ALARMS_PER_HOUR)
-    };
-    let learned = examined(
-        recipe.kind.name(),
-        &Examinee::Learned(Arc::new(model.clone())),
-    )?;
-    let test = InnovationTest::new(VectorSettings::default().monitor.unwrap_or(
-        InnovationTestSettings {
-            epoch_rate_hz: 1.0 / recipe.interval_s,
-            ..InnovationTestSettings::default()
-        },
-    ))?;
-    let innovation = examined("innovation", &Examinee::Innovation(test))?;
-    let mut card = model.card().clone();
-    let scenarios = |data: &Dataset| data.scenarios().len();
-    card.training["data"] = json!({
-        "generator": "xtask::train::plan", "seed": SEED, "kinds": KINDS,
-        "level": "correlator", "steps": split.training.steps(),
-        "scenarios_training": scenarios(&split.training),
-        "scenarios_validation": scenarios(&split.validation), "scenarios_test": scenarios(&split.test),
-    });
-    card.training["test"] = json!({
-        recipe.kind.name(): learned.figures(), "innovation": innovation.figures(),
-    });
-    Ok(Report {
-        model: model.with_card(card)?,
-        examinations: [learned, innovation],
-    })
-}
-
-impl Report {
-    /// Writes weights and card into `folder`, named after the kind.
-    ///
-    /// # Errors
-    /// Names the file that cannot be written.
-    pub fn write(&self, folder: &Path) -> Result<()> {
-        let (weights, card) = self.model.save()?;
-        fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
-        let name = self.model.card().kind.name();
-        for (end, bytes) in [
-            ("safetensors", weights.as_slice()),
-            ("json", card.as_bytes()),
-        ] {
-            let path = folder.join(format!("{name}.{end}"));
-            fs::write(&path, bytes).with_context(|| format!("cannot write {}", path.display()))?;
-        }
-        Ok(())
+/// Names the file that cannot be written.
+pub fn write_model(model: &LearnedModel, folder: &Path) -> Result<()> {
+    let (weights, card) = model.save()?;
+    fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
+    let name = model.card().kind.name();
+    for (end, bytes) in [
+        ("safetensors", weights.as_slice()),
+        ("json", card.as_bytes()),
+    ] {
+        let path = folder.join(format!("{name}.{end}"));
+        fs::write(&path, bytes).with_context(|| format!("cannot write {}", path.display()))?;
     }
+    Ok(())
 }
 
-impl fmt::Display for Report {
+/// The model of a kind in `folder`.
+///
+/// # Errors
+/// Names the file that cannot be read, or what is wrong with it.
+pub fn read_model(kind: ModelKind, folder: &Path) -> Result<LearnedModel> {
+    let path = |end: &str| folder.join(format!("{}.{end}", kind.name()));
+    let (weights, card) = (path("safetensors"), path("json"));
+    let bytes = fs::read(&weights).with_context(|| format!("cannot read {}", weights.display()))?;
+    let text =
+        fs::read_to_string(&card).with_context(|| format!("cannot read {}", card.display()))?;
+    LearnedModel::load(&bytes, &text).with_context(|| weights.display().to_string())
+}
+
+/// What people read of a training.
+#[derive(Debug, Clone, Copy)]
+pub struct Summary<'a>(pub &'a LearnedModel);
+
+impl fmt::Display for Summary<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let point = &self.model.card().operating_point;
+        let card = self.0.card();
+        let point = &card.operating_point;
+        writeln!(f, "{}: {}", card.kind.name(), card.training["fit"])?;
+        writeln!(f, "evidence: {}", card.training["evidence"])?;
         writeln!(
             f,
-            "threshold {:.2} (log-odds) for {} false alarms a channel and hour, from {:.2} channel-hours{}",
+            "threshold {:.2} above an offset of {:.1} (log-odds) for {} false alarms a channel and hour, from {:.1} channel-hours{}",
             point.threshold,
+            card.evidence_offset.unwrap_or_default(),
             point.false_alarms_per_hour,
             point.channel_hours,
             if point.extrapolated {
@@ -165,37 +156,6 @@ impl fmt::Display for Report {
             } else {
                 ""
             }
-        )?;
-        for e in &self.examinations {
-            writeln!(
-                f,
-                "{}: area {:.4} ({:.4} to {:.4}), balanced accuracy {:.4}, steady {:.4}; {} false alarms, {:.3} ({:.3} to {:.3}) an hour",
-                e.name,
-                e.area,
-                e.area_band.0,
-                e.area_band.1,
-                e.balanced.value(),
-                e.balanced_steady.value(),
-                e.false_alarms.events,
-                e.false_alarms.per_hour,
-                e.false_alarms.low,
-                e.false_alarms.high
-            )?;
-            for (class, accuracy) in &e.balanced_by_cn0 {
-                write!(f, "  {class} dB-Hz {:.3}", accuracy.value())?;
-            }
-            writeln!(f)?;
-            for (fault, on) in &e.faults {
-                writeln!(
-                    f,
-                    "  {fault}: {} of {} found, median delay {:.2} s, area {:.4}",
-                    on.delays_s.len(),
-                    on.faults,
-                    on.median_delay_s(),
-                    e.area_by_fault.get(fault).copied().unwrap_or(f64::NAN)
-                )?;
-            }
-        }
-        Ok(())
+        )
     }
 }

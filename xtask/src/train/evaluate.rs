@@ -1,14 +1,14 @@
 //! One examination for every monitor: what it sees, how soon, and what it cries wolf at.
 
 use anyhow::Result;
-use fault_ml::learned::{Dataset, HealthyScores, choose, cn0_class_dbhz};
-use fault_ml::metrics::{BalancedAccuracy, RateInterval, Roc, Share};
+use fault_ml::learned::{Dataset, choose, cn0_class_dbhz};
+use fault_ml::metrics::{BalancedAccuracy, Roc, Share};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
-use super::scoring::{Examinee, healthy};
+use super::scoring::Examinee;
 
 /// Windows that areas and accuracies are taken over, evenly by kind, fault and C/N0.
 const EXAMINED: usize = 20_000;
@@ -74,28 +74,39 @@ pub struct Examination {
     pub balanced_by_cn0: BTreeMap<i64, BalancedAccuracy>,
     /// Alarm threshold.
     pub threshold: f64,
-    /// False alarms of healthy test channels at it.
-    pub false_alarms: RateInterval,
     /// By fault, at it.
     pub faults: BTreeMap<String, OnFault>,
 }
 
-/// Examines `examinee` on `test`, its thresholds found on `validation` for `per_hour` false alarms.
+/// Steps to examine a monitor on.
+#[derive(Debug, Clone, Copy)]
+pub struct Examined<'a> {
+    /// By which the cut between windows is found.
+    pub validation: &'a Dataset,
+    /// By which areas and accuracies are found: the innovation test has left out what it found.
+    pub watched: &'a Dataset,
+    /// By which alarms are found: nothing was left out, as it is until a monitor's first alarm.
+    pub unwatched: &'a Dataset,
+}
+
+/// Examines `examinee` on windows of so many steps, and by its alarms at `threshold`.
 ///
 /// # Errors
 /// Where a part is too small or holds no numbers.
 pub fn examine(
     name: &str,
     examinee: &Examinee,
-    (validation, test): (&Dataset, &Dataset),
-    (window, interval_s): (usize, f64),
-    per_hour: f64,
+    examined: Examined,
+    window: usize,
+    threshold: f64,
 ) -> Result<Examination> {
+    let (validation, test) = (examined.validation, examined.watched);
     let held_out = examinee.all_scores(validation)?;
     let scores = examinee.all_scores(test)?;
-    let quiet: HealthyScores = healthy(validation, &held_out, interval_s);
-    let threshold = quiet.operating_point(per_hour)?.threshold;
-    let cut = best_cut(&decisions(validation, &held_out, window));
+    let alarms = examinee.all_scores(examined.unwatched)?;
+    let held_out = decisions(validation, &held_out, window);
+    let plain: Vec<(f64, bool)> = held_out.iter().map(|d| (d.score, d.faulty)).collect();
+    let cut = best_cut(&plain);
     let all = decisions(test, &scores, window);
     let accuracy = |keep: &dyn Fn(&Decision) -> bool| {
         let kept = all.iter().filter(|d| keep(d));
@@ -126,8 +137,7 @@ pub fn examine(
             .map(|c| (*c, accuracy(&|d| d.cn0_dbhz == *c)))
             .collect(),
         threshold,
-        false_alarms: healthy(test, &scores, interval_s).rate(threshold),
-        faults: on_faults(test, &scores, threshold),
+        faults: on_faults(examined.unwatched, &alarms, threshold),
     })
 }
 
@@ -149,10 +159,10 @@ fn decisions(data: &Dataset, scores: &[Vec<Option<f64>>], window: usize) -> Vec<
     ends.iter().filter_map(decide).collect()
 }
 
-/// The threshold of the largest balanced accuracy.
-fn best_cut(decisions: &[Decision]) -> f64 {
-    let plain: Vec<(f64, bool)> = decisions.iter().map(|d| (d.score, d.faulty)).collect();
-    let roc = Roc::new(&plain);
+/// The threshold of the largest balanced accuracy over scores and whether they are of faulty windows.
+#[must_use]
+pub fn best_cut(scores: &[(f64, bool)]) -> f64 {
+    let roc = Roc::new(scores);
     let points = roc.iter().flat_map(|roc| roc.points());
     let best = points
         .max_by(|a, b| (a.detections - a.false_alarms).total_cmp(&(b.detections - b.false_alarms)));
@@ -188,8 +198,9 @@ fn area_by_fault(
     faulty.into_iter().map(area).collect()
 }
 
-/// The first alarm of every fault.
-fn on_faults(
+/// The first alarm of every fault at `threshold`.
+#[must_use]
+pub fn on_faults(
     data: &Dataset,
     scores: &[Vec<Option<f64>>],
     threshold: f64,
@@ -246,8 +257,6 @@ impl Examination {
             "balanced_accuracy_steady": accuracy(&self.balanced_steady),
             "balanced_accuracy_by_cn0_dbhz": classes,
             "threshold": self.threshold,
-            "false_alarms_per_hour": self.false_alarms.per_hour,
-            "false_alarms_per_hour_95": [self.false_alarms.low, self.false_alarms.high],
             "faults": faults,
         })
     }

@@ -1,20 +1,28 @@
 //! From labelled steps to a model with calibration, threshold and figures.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use fault_ml::learned::lstm::LstmTraining;
 use fault_ml::learned::svm::SvmTraining;
 use fault_ml::learned::{
-    Calibration, Card, Dataset, FORMAT, FeatureSet, Features, LearnedModel, Mode, ModelKind,
-    Network, OperatingPoint, Scaler, Split, VERSION, Windows, choose, features, healthy_scaler,
+    Calibration, Card, Dataset, FORMAT, FeatureSet, Features, HealthyScores, LearnedModel, Mode,
+    ModelKind, Network, OperatingPoint, Scaler, VERSION, Windows, choose, features, healthy_scaler,
 };
 use serde_json::{Value, json};
 
-use super::scoring::{Examinee, healthy};
+use super::evaluate::{OnFault, on_faults};
+use super::plan::Series;
+use super::quiet;
+use super::scoring::{Examinee, add_healthy};
 
 /// False alarms of a channel an hour that thresholds are found for.
 pub const FALSE_ALARMS_PER_HOUR: f64 = 0.01;
+/// Offsets of the evidence that are tried, log-odds.
+const OFFSETS: [f64; 4] = [0.0, 1.0, 2.0, 3.0];
+/// A fault that is not found counts as found after so long, s.
+const MISSED_S: f64 = 10.0;
 /// Windows that the calibration is fitted to.
 const CALIBRATED_ON: usize = 4000;
 
@@ -52,14 +60,18 @@ impl Recipe {
         let base = Self {
             kind,
             features: FeatureSet::Full,
-            window: 10,
+            window: 5,
             mode: Mode::Window,
             decide_every: 5,
             interval_s: 0.02,
-            windows: 6000,
-            length: 10,
+            windows: 4000,
+            length: 5,
             svm: SvmTraining::default(),
-            lstm: LstmTraining::default(),
+            lstm: LstmTraining {
+                epochs: 12,
+                patience: 4,
+                ..LstmTraining::default()
+            },
             seed: 1,
         };
         match kind {
@@ -68,8 +80,8 @@ impl Recipe {
                 window: 50,
                 mode: Mode::Streaming,
                 decide_every: 1,
-                windows: 8000,
-                length: 150,
+                windows: 5000,
+                length: 100,
                 ..base
             },
         }
@@ -86,14 +98,14 @@ impl Recipe {
         Windows::gather(data, features, scaler, self.length, &ends)
     }
 
-    /// Trains on the training part of `split`; calibrates and finds the threshold on the validation part.
+    /// Trains on `training`; stops and calibrates by `held_out`.
     ///
     /// # Errors
     /// Where a part is too small or of one kind alone.
-    pub fn fit(&self, split: &Split) -> Result<LearnedModel> {
-        let rows = features(&split.training, self.features)?;
-        let scaler = healthy_scaler(&split.training, &rows)?;
-        let training = self.windows((&split.training, &rows), &scaler, self.windows);
+    pub fn fit(&self, training: &Dataset, held_out: &Dataset) -> Result<LearnedModel> {
+        let rows = features(training, self.features)?;
+        let scaler = healthy_scaler(training, &rows)?;
+        let training = self.windows((training, &rows), &scaler, self.windows);
         let (network, how) = match self.kind {
             ModelKind::Svm => {
                 let fit = self.svm.fit(&training)?;
@@ -105,8 +117,8 @@ impl Recipe {
             }
             ModelKind::Lstm => {
                 let validation = {
-                    let rows = features(&split.validation, self.features)?;
-                    self.windows((&split.validation, &rows), &scaler, self.windows / 4)
+                    let rows = features(held_out, self.features)?;
+                    self.windows((held_out, &rows), &scaler, self.windows / 4)
                 };
                 let settings = LstmTraining {
                     mode: self.mode,
@@ -123,7 +135,7 @@ impl Recipe {
             }
         };
         let raw = LearnedModel::new(self.card(how), scaler, network)?;
-        calibrated(raw, &split.validation, FALSE_ALARMS_PER_HOUR)
+        calibrated(raw, held_out)
     }
 
     fn card(&self, how: Value) -> Card {
@@ -137,6 +149,7 @@ impl Recipe {
             interval_s: self.interval_s,
             decide_every: self.decide_every,
             calibration: Calibration::NONE,
+            evidence_offset: None,
             operating_point: OperatingPoint {
                 threshold: 0.0,
                 false_alarms_per_hour: FALSE_ALARMS_PER_HOUR,
@@ -149,35 +162,109 @@ impl Recipe {
     }
 }
 
-/// The model with the calibration and threshold that held-out scenarios give, for `per_hour` false alarms of a
-/// channel an hour.
+/// `model` with the calibration that held-out scenarios give.
 ///
 /// # Errors
 /// Where they hold too little.
-pub fn calibrated(model: LearnedModel, held_out: &Dataset, per_hour: f64) -> Result<LearnedModel> {
+pub fn calibrated(model: LearnedModel, held_out: &Dataset) -> Result<LearnedModel> {
     let mut card = model.card().clone();
-    let interval_s = card.interval_s;
-    let examinee = Examinee::Learned(Arc::new(model.clone()));
-    let mut scores = examinee.all_scores(held_out)?;
+    let scores = Examinee::Learned(Arc::new(model.clone())).all_scores(held_out)?;
     let ends = choose(held_out, card.window, CALIBRATED_ON, 1);
     let rows: Vec<(f64, bool)> = ends
         .iter()
         .filter_map(|end| {
             let score = (*scores.get(end.sequence)?.get(end.newest)?)?;
-            let label = held_out
+            let step = held_out
                 .sequences
                 .get(end.sequence)?
                 .steps
-                .get(end.newest)?
-                .label;
-            Some((score, label.is_faulty()))
+                .get(end.newest)?;
+            Some((score, step.label.is_faulty()))
         })
         .collect();
     card.calibration = Calibration::fit(&rows)?;
-    for score in scores.iter_mut().flatten().flatten() {
-        *score = card.calibration.log_odds(*score);
-    }
-    let healthy = healthy(held_out, &scores, interval_s);
+    Ok(model.with_card(card)?)
+}
+
+/// `model` with the threshold that the healthy channels of held-out scenarios give, every step by its own.
+///
+/// # Errors
+/// Where they hold too little.
+pub fn with_threshold(
+    model: LearnedModel,
+    held_out: &Dataset,
+    per_hour: f64,
+) -> Result<LearnedModel> {
+    let mut card = model.card().clone();
+    let scores = Examinee::Learned(Arc::new(model.clone())).all_scores(held_out)?;
+    let mut healthy = HealthyScores::default();
+    add_healthy(&mut healthy, held_out, &scores, card.interval_s);
     card.operating_point = healthy.operating_point(per_hour)?;
     Ok(model.with_card(card)?)
+}
+
+/// `model` with the offset of its evidence, and the threshold that belongs to it, that find the faults of `held_out`
+/// soonest at [`FALSE_ALARMS_PER_HOUR`]; the thresholds are those of `channel_hours` of other healthy channels.
+///
+/// # Errors
+/// Where a run fails or a part is too small.
+pub fn with_evidence(
+    model: LearnedModel,
+    held_out: &Dataset,
+    channel_hours: f64,
+) -> Result<LearnedModel> {
+    let interval_s = model.card().interval_s;
+    let candidates: Vec<LearnedModel> = OFFSETS
+        .iter()
+        .map(|offset| unbounded(&model, Some(*offset)))
+        .collect::<Result<_>>()?;
+    let examinees: Vec<Examinee> = candidates
+        .into_iter()
+        .map(|model| Examinee::Learned(Arc::new(model)))
+        .collect();
+    let numbers = 0..quiet::runs(channel_hours);
+    let quiet = quiet::scores(Series::VALIDATION, numbers, &examinees, interval_s)?;
+    let mut best: Option<(f64, Card)> = None;
+    let mut tried = Vec::new();
+    for ((offset, examinee), healthy) in OFFSETS.iter().zip(&examinees).zip(&quiet) {
+        let point = healthy.operating_point(FALSE_ALARMS_PER_HOUR)?;
+        let faults = on_faults(held_out, &examinee.all_scores(held_out)?, point.threshold);
+        let delay_s = mean_delay_s(&faults);
+        tried.push(
+            json!({ "offset": offset, "threshold": point.threshold, "mean_delay_s": delay_s }),
+        );
+        if best.as_ref().is_none_or(|(least, _)| delay_s < *least) {
+            let card = Card {
+                evidence_offset: Some(*offset),
+                operating_point: point,
+                ..model.card().clone()
+            };
+            best = Some((delay_s, card));
+        }
+    }
+    let (_, mut card) = best.context("no offset of the evidence")?;
+    card.training["evidence"] = json!({ "tried": tried, "never_found_counts_s": MISSED_S });
+    Ok(model.with_card(card)?)
+}
+
+/// `model` with that offset of its evidence, and no end to it.
+///
+/// # Errors
+/// None in practice.
+pub fn unbounded(model: &LearnedModel, offset: Option<f64>) -> Result<LearnedModel> {
+    let mut card = model.card().clone();
+    card.evidence_offset = offset;
+    card.operating_point.threshold = f64::MAX / 4.0;
+    Ok(model.clone().with_card(card)?)
+}
+
+/// Mean delay over all faults, s.
+fn mean_delay_s(faults: &BTreeMap<String, OnFault>) -> f64 {
+    let (mut sum, mut count) = (0.0, 0);
+    for on in faults.values() {
+        let found = on.delays_s.iter().map(|delay_s| delay_s.min(MISSED_S));
+        sum += found.sum::<f64>() + MISSED_S * (on.faults - on.delays_s.len()) as f64;
+        count += on.faults;
+    }
+    sum / f64::from(count as u32)
 }

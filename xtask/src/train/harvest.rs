@@ -32,25 +32,45 @@ impl Pupil for Product {
     }
 }
 
-/// Labelled steps of `plans`, each received by `pupil` at the correlator level.
+/// The same without a monitor: as it is for every monitor until its first alarm.
+#[derive(Debug, Clone, Copy)]
+pub struct Unwatched;
+
+impl Pupil for Unwatched {
+    fn settings(&self, scenario: &Scenario) -> Settings {
+        let watched = Product.settings(scenario);
+        let vector = watched.vector.map(|vector| VectorSettings {
+            monitor: None,
+            ..vector
+        });
+        Settings { vector, ..watched }
+    }
+}
+
+/// Labelled steps of `plans`, each received by `pupil` at `level`.
 ///
 /// # Errors
 /// Where a scenario cannot be made or a run fails.
-pub fn harvest(plans: &[Plan], seed: u64, pupil: &impl Pupil) -> Result<Dataset> {
-    let all = judged::in_parallel(plans.len(), |number| {
-        let plan = &plans[number];
-        let scenario = plan.scenario(seed)?;
-        let judged = judged::receive(&scenario, Level::Correlator, &pupil.settings(&scenario))?;
-        let elapsed_s = |time_s| scenario.elapsed_s(time_s);
-        let mut data = labelled(plan.number, &judged.channels, &scenario.accounts, elapsed_s);
-        for sequence in data.sequences.iter_mut().filter(|s| !s.fault.is_empty()) {
-            sequence.fault += plan.severity.suffix();
-        }
-        Ok(data)
-    })?;
+pub fn harvest(plans: &[Plan], level: Level, pupil: &impl Pupil) -> Result<Dataset> {
+    let all = judged::in_parallel(plans.len(), |number| steps(&plans[number], level, pupil))?;
     let mut data = Dataset::default();
     for part in all {
         data.sequences.extend(part.sequences);
+    }
+    Ok(data)
+}
+
+/// Labelled steps of one run.
+///
+/// # Errors
+/// As [`harvest`].
+pub fn steps(plan: &Plan, level: Level, pupil: &impl Pupil) -> Result<Dataset> {
+    let scenario = plan.scenario()?;
+    let judged = judged::receive(&scenario, level, &pupil.settings(&scenario))?;
+    let elapsed_s = |time_s| scenario.elapsed_s(time_s);
+    let mut data = labelled(plan.number, &judged.channels, &scenario.accounts, elapsed_s);
+    for sequence in data.sequences.iter_mut().filter(|s| !s.fault.is_empty()) {
+        sequence.fault += plan.severity.suffix();
     }
     Ok(data)
 }

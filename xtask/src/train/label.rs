@@ -1,9 +1,8 @@
 //! What is true of a channel at a time: the faults of a scenario, beside what a receiver saw.
 
-use fault_ml::Innovation;
-use fault_ml::learned::{ChannelStep, Dataset, Label, LabelledStep, Sequence};
+use fault_ml::learned::{Dataset, Label, LabelledStep, Sequence};
 use gnss_nav::SatelliteId;
-use receiver::record::{ChannelRecord, LoopMembership};
+use receiver::record::ChannelRecord;
 
 use crate::scenario::fault::Account;
 
@@ -36,28 +35,6 @@ fn label(account: Option<&Account>, elapsed_s: f64) -> Label {
     if is_on { Label::Faulty } else { Label::Healthy }
 }
 
-/// What a monitor is shown of `record`; `None` where the filter had no innovation of the channel.
-#[must_use]
-pub fn step(record: &ChannelRecord) -> Option<ChannelStep> {
-    let code = record.innovation_code_m?;
-    let tracking = record.tracking.as_ref();
-    let tracking = tracking.filter(|t| t.membership == LoopMembership::Vector)?;
-    let (rate_mps, rate_sigma_mps) = record
-        .innovation_rate_mps
-        .map_or((0.0, f64::INFINITY), |rate| (rate.value, rate.sigma));
-    Some(ChannelStep {
-        satellite: record.satellite.prn.into(),
-        innovation: Innovation {
-            code_m: code.value,
-            code_sigma_m: code.sigma,
-            rate_mps,
-            rate_sigma_mps,
-        },
-        cn0_dbhz: record.cn0_dbhz?,
-        prompt_power: tracking.prompt.norm_sqr(),
-    })
-}
-
 /// The channels of a run as labelled sequences, by satellite; `elapsed_s` turns a record's time into that of
 /// the faults.
 #[must_use]
@@ -76,7 +53,7 @@ pub fn labelled(
         let fault = account.map_or("", |account| account.kind);
         let mut last_s = f64::NEG_INFINITY;
         for record in channels.iter().filter(|c| c.satellite == satellite) {
-            let Some(step) = step(record) else { continue };
+            let Some(step) = record.shown else { continue };
             let time_s = record.time_s;
             if time_s - last_s > LONGEST_GAP_S {
                 data.sequences.push(Sequence {

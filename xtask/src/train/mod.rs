@@ -7,6 +7,7 @@ pub mod harvest;
 pub mod label;
 pub mod paper;
 pub mod plan;
+pub mod quiet;
 pub mod scoring;
 
-pub use command::{Report, Trained, train};
+pub use command::{Trained, train};

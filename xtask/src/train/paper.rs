@@ -1,14 +1,13 @@
 //! Accuracy by the number of innovations (Figure 5 of Jiang2017, Figure 6 of Zhu2020): a blocked channel, raw
 //! innovations, the receiver of the papers.
 
-use std::sync::Arc;
-
 use anyhow::Result;
 use fault_ml::learned::lstm::LstmTraining;
 use fault_ml::learned::svm::SvmTraining;
 use fault_ml::learned::{
     Calibration, Card, Dataset, FORMAT, FeatureSet, LearnedModel, Mode, ModelKind, Network,
-    OperatingPoint, Split, VERSION, Windows, choose, cn0_class_dbhz, features, healthy_scaler,
+    OperatingPoint, Split, VERSION, WindowEnd, Windows, choose, cn0_class_dbhz, features,
+    healthy_scaler,
 };
 use fault_ml::metrics::BalancedAccuracy;
 use gnss_nav::tracking_noise;
@@ -17,8 +16,9 @@ use rand_chacha::ChaCha8Rng;
 use receiver::pipeline::{MeasurementNoise, Settings};
 use serde_json::json;
 
+use super::evaluate::best_cut;
+use super::fit::{calibrated, with_threshold};
 use super::label::labelled;
-use super::scoring::Examinee;
 use crate::judged;
 use crate::reproduce::jiang2017::receivers::{INTERVAL_S, Variant};
 use crate::scenario::built::Scenario;
@@ -141,8 +141,47 @@ impl Accuracy {
     }
 }
 
-/// Windows trained on.
-const TRAINED_ON: usize = 3000;
+/// Windows that a layer is trained on, and a machine: the cost of its kernel grows with their square.
+const LAYER_WINDOWS: usize = 2400;
+const MACHINE_WINDOWS: usize = 1200;
+/// Passes over them at most.
+const PASSES: usize = 12;
+/// One window in so many is judged; a number that divides no other period here.
+const JUDGED_EVERY: usize = 7;
+/// The paper's number of innovations of the LSTM.
+pub const LSTM_LENGTH: usize = 50;
+/// That of Jiang2017, of the machine.
+pub const SVM_LENGTH: usize = 30;
+/// First seeds of what is learned from and of what is judged by: no scenario is in both, nor in those of the
+/// flights.
+pub const LEARNED_FROM: u64 = 2_000_001;
+/// See [`LEARNED_FROM`].
+pub const JUDGED_BY: u64 = 1_000_001;
+/// Part of what is learned from that is held out, to stop by and for thresholds.
+const HELD_OUT: f64 = 0.25;
+/// False alarms of a channel an hour in a flight.
+const FLIGHT_ALARMS_PER_HOUR: f64 = 0.1;
+
+/// What is learned from: `seeds` runs of every class at the correlator level, a quarter of them held out.
+///
+/// # Errors
+/// Where a run fails.
+pub fn lessons(seeds: usize) -> Result<Split> {
+    Ok(harvest(seeds, LEARNED_FROM, Level::Correlator)?.split(HELD_OUT, 0.0, 1))
+}
+
+/// A monitor of the paper's own number of innovations, ready to fly.
+///
+/// # Errors
+/// Where there is too little to learn from.
+pub fn monitor(kind: ModelKind, split: &Split) -> Result<LearnedModel> {
+    let length = match kind {
+        ModelKind::Svm => SVM_LENGTH,
+        ModelKind::Lstm => LSTM_LENGTH,
+    };
+    let model = calibrated(fit(kind, length, split, 1)?, &split.validation)?;
+    with_threshold(model, &split.validation, FLIGHT_ALARMS_PER_HOUR)
+}
 
 /// Trains a model of `kind` on windows of `length` raw innovations.
 ///
@@ -156,7 +195,11 @@ pub fn fit(kind: ModelKind, length: usize, split: &Split, seed: u64) -> Result<L
         let ends = choose(data, length, count, seed);
         Windows::gather(data, rows, &scaler, length, &ends)
     };
-    let training = gather(&split.training, &rows, TRAINED_ON);
+    let count = match kind {
+        ModelKind::Svm => MACHINE_WINDOWS,
+        ModelKind::Lstm => LAYER_WINDOWS,
+    };
+    let training = gather(&split.training, &rows, count);
     let network = match kind {
         ModelKind::Svm => {
             let settings = SvmTraining {
@@ -167,10 +210,10 @@ pub fn fit(kind: ModelKind, length: usize, split: &Split, seed: u64) -> Result<L
         }
         ModelKind::Lstm => {
             let held_out = features(&split.validation, set)?;
-            let validation = gather(&split.validation, &held_out, TRAINED_ON / 4);
+            let validation = gather(&split.validation, &held_out, LAYER_WINDOWS / 4);
             let settings = LstmTraining {
                 mode: Mode::Window,
-                epochs: 15,
+                epochs: PASSES,
                 seed,
                 ..LstmTraining::default()
             };
@@ -187,6 +230,7 @@ pub fn fit(kind: ModelKind, length: usize, split: &Split, seed: u64) -> Result<L
         interval_s: INTERVAL_S,
         decide_every: 1,
         calibration: Calibration::NONE,
+        evidence_offset: None,
         operating_point: OperatingPoint {
             threshold: 0.0,
             false_alarms_per_hour: 1.0,
@@ -199,41 +243,75 @@ pub fn fit(kind: ModelKind, length: usize, split: &Split, seed: u64) -> Result<L
     Ok(LearnedModel::new(card, scaler, network)?)
 }
 
-/// How `model` fares on every window of `test`: a raw score above zero is faulty, as it was trained.
+/// A window that was judged.
+struct Judged {
+    score: f64,
+    faulty: bool,
+    /// Whether the channel became faulty within it.
+    new: bool,
+    class: i64,
+}
+
+/// One in [`JUDGED_EVERY`] of the windows of `data`, by `model`'s raw score.
+fn judged_windows(model: &LearnedModel, data: &Dataset) -> Result<Vec<Judged>> {
+    let (card, scaler) = (model.card(), model.scaler());
+    let (length, width) = (card.window, scaler.width());
+    let rows = features(data, card.features)?;
+    let mut ends = Vec::new();
+    for (sequence, steps) in data.sequences.iter().enumerate() {
+        let last = steps.steps.len();
+        let newest = (length.saturating_sub(1)..last).step_by(JUDGED_EVERY);
+        ends.extend(newest.map(|newest| WindowEnd { sequence, newest }));
+    }
+    let windows = Windows::gather(data, &rows, scaler, length, &ends);
+    let mut judged = Vec::new();
+    let mut state = match model.network() {
+        Network::Lstm(cell) => Some(cell.zero_state()),
+        Network::Svm(_) => None,
+    };
+    let values = windows.values().chunks(length * width);
+    let labels = windows.step_labels().chunks(length);
+    for ((end, window), labels) in ends.iter().zip(values).zip(labels) {
+        let score = match (model.network(), &mut state) {
+            (Network::Lstm(cell), Some(state)) => cell.window(state, window),
+            (Network::Svm(machine), _) => machine.decision(window),
+            (Network::Lstm(_), None) => continue,
+        };
+        let step = &data.sequences[end.sequence].steps[end.newest];
+        judged.push(Judged {
+            score: f64::from(score),
+            faulty: step.label.is_faulty(),
+            new: labels.first() != labels.last(),
+            class: cn0_class_dbhz(step.step.cn0_dbhz),
+        });
+    }
+    Ok(judged)
+}
+
+/// How `model` fares on windows of `test`, which come as often as they do; the score above which one is faulty is
+/// that of the largest balanced accuracy on `held_out`.
 ///
 /// # Errors
 /// Where a step holds no numbers.
-pub fn accuracy(model: &LearnedModel, test: &Dataset) -> Result<Accuracy> {
-    let length = model.card().window;
-    let scores = Examinee::Learned(Arc::new(model.clone())).all_scores(test)?;
-    let mut all = Vec::new();
-    for (sequence, scores) in test.sequences.iter().zip(scores) {
-        let mut since = usize::MAX;
-        let mut before = None;
-        for (step, score) in sequence.steps.iter().zip(scores) {
-            let changed = before.is_some_and(|label| label != step.label);
-            since = if changed { 0 } else { since.saturating_add(1) };
-            before = Some(step.label);
-            let class = cn0_class_dbhz(step.step.cn0_dbhz);
-            all.extend(score.map(|s| (s > 0.0, step.label.is_faulty(), since < length, class)));
-        }
-    }
+pub fn accuracy(model: &LearnedModel, held_out: &Dataset, test: &Dataset) -> Result<Accuracy> {
+    let plain = judged_windows(model, held_out)?;
+    let plain: Vec<_> = plain.iter().map(|j| (j.score, j.faulty)).collect();
+    let cut = best_cut(&plain);
+    let all = judged_windows(model, test)?;
     let of = |class: Option<i64>, steady: bool| {
         let kept = all
             .iter()
-            .filter(|(_, _, new, c)| class.is_none_or(|k| k == *c) && !(steady && *new));
-        BalancedAccuracy::of(kept.map(|(found, truth, _, _)| (*found, *truth)))
+            .filter(|j| class.is_none_or(|k| k == j.class) && !(steady && j.new));
+        BalancedAccuracy::of(kept.map(|j| (j.score > cut, j.faulty)))
+    };
+    let by_class = |steady| {
+        let classes = CLASSES_DBHZ.iter().map(|c| (*c, of(Some(*c), steady)));
+        classes.collect()
     };
     Ok(Accuracy {
         all: of(None, false),
         steady: of(None, true),
-        by_class: CLASSES_DBHZ
-            .iter()
-            .map(|c| (*c, of(Some(*c), false)))
-            .collect(),
-        steady_by_class: CLASSES_DBHZ
-            .iter()
-            .map(|c| (*c, of(Some(*c), true)))
-            .collect(),
+        by_class: by_class(false),
+        steady_by_class: by_class(true),
     })
 }

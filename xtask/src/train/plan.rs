@@ -50,26 +50,80 @@ impl Severity {
     }
 }
 
+/// Scenarios that share nothing with those of another series: seeds, places, and the week they are in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Series {
+    /// Seed of everything drawn.
+    pub seed: u64,
+    /// GPS week.
+    pub week: u32,
+}
+
+impl Series {
+    /// What is learned from.
+    pub const TRAINING: Self = Self {
+        seed: 1,
+        week: 2420,
+    };
+    /// What training stops by, and calibration and evidence are chosen by.
+    pub const VALIDATION: Self = Self {
+        seed: 2,
+        week: 2433,
+    };
+    /// What thresholds are found and false alarms counted by.
+    pub const HEALTHY: Self = Self {
+        seed: 3,
+        week: 2441,
+    };
+    /// What is judged by.
+    pub const TEST: Self = Self {
+        seed: 4,
+        week: 2467,
+    };
+}
+
+/// How a receiver moves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Motion {
+    /// It rests.
+    Rest,
+    /// It goes round a circle.
+    Circle,
+    /// It goes straight, at up to 250 m/s.
+    Straight,
+}
+
+/// Clocks of receivers, by preset.
+pub const CLOCKS: [&str; 3] = ["tcxo", "ocxo", "csac"];
+
 /// What may differ between draws.
 #[derive(Debug, Clone, Copy)]
 pub struct Plan {
-    /// Number of the scenario, and its seed.
+    /// Where it belongs.
+    pub series: Series,
+    /// Number of the scenario in its series.
     pub number: u32,
+    /// Signal, s.
+    pub duration_s: f64,
     /// Fault.
     pub kind: &'static str,
     /// How severe.
     pub severity: Severity,
     /// C/N0 of all satellites, dB-Hz; `None`: by elevation.
     pub cn0_dbhz: Option<f64>,
+    /// How the receiver moves.
+    pub motion: Motion,
+    /// Its clock.
+    pub clock: &'static str,
 }
 
 impl Plan {
-    /// Number `number` of a series of `seed`: kinds in turn, severities in turn after them.
+    /// Number `number` of a series: kinds in turn, severities in turn after them.
     #[must_use]
-    pub fn new(number: u32, seed: u64) -> Self {
+    pub fn new(number: u32, series: Series) -> Self {
         let turn = KINDS.len() as u32;
         let mut random =
-            ChaCha8Rng::seed_from_u64(seed.wrapping_mul(0x9e37_79b9) ^ u64::from(number));
+            ChaCha8Rng::seed_from_u64(series.seed.wrapping_mul(0x9e37_79b9) ^ u64::from(number));
         let severity = if (number / turn).is_multiple_of(2) {
             Severity::Severe
         } else {
@@ -77,10 +131,24 @@ impl Plan {
         };
         let even = !(number / (2 * turn)).is_multiple_of(3);
         Self {
+            series,
             number,
+            duration_s: DURATION_S,
             kind: KINDS[(number % turn) as usize],
             severity,
             cn0_dbhz: even.then(|| random.random_range(30.0..50.0)),
+            motion: [Motion::Rest, Motion::Circle, Motion::Straight][random.random_range(0..3)],
+            clock: CLOCKS[random.random_range(0..3)],
+        }
+    }
+
+    /// The same without a fault, for `duration_s`.
+    #[must_use]
+    pub fn healthy(number: u32, series: Series, duration_s: f64) -> Self {
+        Self {
+            kind: "none",
+            duration_s,
+            ..Self::new(number, series)
         }
     }
 
@@ -88,14 +156,16 @@ impl Plan {
     ///
     /// # Errors
     /// Where the generator has drawn an impossible one.
-    pub fn scenario(&self, seed: u64) -> Result<Scenario> {
-        let run_seed = seed
+    pub fn scenario(&self) -> Result<Scenario> {
+        let series = self.series;
+        let run_seed = series
+            .seed
             .wrapping_mul(1_000_003)
             .wrapping_add(self.number.into());
         let mut random = ChaCha8Rng::seed_from_u64(run_seed);
         let mut text = self.receiver(&mut random);
         let path = Path::new("");
-        let name = format!("training {}", self.number);
+        let name = format!("series {} number {}", series.seed, self.number);
         if self.kind == "none" {
             let file = ScenarioFile::parse(&name, &name, path, text)?;
             return Scenario::new(&file, Some(run_seed));
@@ -111,28 +181,28 @@ impl Plan {
 
     /// Everything but the fault.
     fn receiver(&self, random: &mut impl Rng) -> String {
-        let place = |random: &mut dyn FnMut(f64, f64) -> f64, height_m: f64| {
-            let (lat, lon) = (random(-65.0, 65.0), random(-180.0, 180.0));
-            format!("{{ lat_deg = {lat:.4}, lon_deg = {lon:.4}, height_m = {height_m} }}")
-        };
         let mut uniform = |low: f64, high: f64| random.random_range(low..high);
         let tow_s = uniform(0.0, 600_000.0).round();
-        let at = place(&mut uniform, 100.0);
-        let trajectory = match uniform(0.0, 3.0) as u32 {
-            0 => format!("{{ kind = 'static', at = {at} }}"),
-            1 => format!(
+        let at = format!(
+            "{{ lat_deg = {:.4}, lon_deg = {:.4}, height_m = 100.0 }}",
+            uniform(-65.0, 65.0),
+            uniform(-180.0, 180.0)
+        );
+        let trajectory = match self.motion {
+            Motion::Rest => format!("{{ kind = 'static', at = {at} }}"),
+            Motion::Circle => format!(
                 "{{ kind = 'circle', start = {at}, heading_deg = {:.1}, speed_mps = {:.1}, radius_m = {:.0} }}",
                 uniform(0.0, 360.0),
                 uniform(5.0, 40.0),
                 uniform(300.0, 2000.0)
             ),
-            _ => format!(
-                "{{ kind = 'road', start = {at}, heading_deg = {:.1}, speed_mps = {:.1}, leg = [{{ duration_s = 40, acceleration_mps2 = 0 }}] }}",
+            Motion::Straight => format!(
+                "{{ kind = 'road', start = {at}, heading_deg = {:.1}, speed_mps = {:.1}, leg = [{{ duration_s = {:.0}, acceleration_mps2 = 0 }}] }}",
                 uniform(0.0, 360.0),
-                uniform(5.0, 250.0)
+                uniform(5.0, 250.0),
+                self.duration_s + 8.0
             ),
         };
-        let clock = ["tcxo", "ocxo", "csac"][uniform(0.0, 3.0) as usize];
         let cn0 = match self.cn0_dbhz {
             Some(cn0) => format!("{{ fixed_dbhz = {cn0:.2} }}"),
             None => format!(
@@ -143,15 +213,18 @@ impl Plan {
         };
         format!(
             "description = 'training'
-start = {{ week = 2420, tow_s = {tow_s:?} }}
-duration_s = {DURATION_S:?}
+start = {{ week = {}, tow_s = {tow_s:?} }}
+duration_s = {:?}
 constellation = {{ elevation_mask_deg = 10 }}
 trajectory = {trajectory}
-clock = {{ preset = '{clock}', drift = {:e} }}
+clock = {{ preset = '{}', drift = {:e} }}
 cn0 = {cn0}
 front_end = {{ format = 'ci8', sample_rate_hz = 4e6, bandwidth_hz = 3.6e6 }}
 receiver = {{ assisted = true }}
 ",
+            self.series.week,
+            self.duration_s,
+            self.clock,
             uniform(-5e-7, 5e-7)
         )
     }

@@ -9,12 +9,8 @@ use std::sync::Arc;
 /// Exceedances closer than this belong to one alarm, s.
 const ALARM_S: f64 = 2.0;
 
-/// A filter that has just taken over is still settling for so long, s: its innovations are not yet those of its
-/// covariance.
-const SETTLING_S: f64 = 5.0;
-
 /// A monitor under examination.
-#[derive(Clone)]
+#[derive(Debug, Clone)]
 pub enum Examinee {
     /// The innovation test.
     Innovation(InnovationTest),
@@ -60,11 +56,14 @@ impl Examinee {
     }
 }
 
-/// The scores of all channels of a scenario until a fault befalls one of them: what is false can only be told
-/// while nothing is wrong, for an error that is not found yet lies in the innovations of all. Scenarios of
-/// interference do not count, nor do the first 5 s of a channel.
-#[must_use]
-pub fn healthy(data: &Dataset, scores: &[Vec<Option<f64>>], interval_s: f64) -> HealthyScores {
+/// Adds to `healthy` the scores of all channels of each scenario until a fault befalls one of them: what is false can
+/// only be told while nothing is wrong, for an error that is not found yet lies in the innovations of all.
+pub fn add_healthy(
+    healthy: &mut HealthyScores,
+    data: &Dataset,
+    scores: &[Vec<Option<f64>>],
+    interval_s: f64,
+) {
     let mut onsets_s: BTreeMap<u32, f64> = BTreeMap::new();
     for sequence in data.sequences.iter().filter(|s| !s.fault.is_empty()) {
         let first = sequence.steps.iter().find(|s| s.label.is_faulty());
@@ -73,21 +72,12 @@ pub fn healthy(data: &Dataset, scores: &[Vec<Option<f64>>], interval_s: f64) -> 
         // A satellite's signal may be lost and come back: the part of it with the fault counts.
         *onset_s = onset_s.max(begin_s);
     }
-    let mut healthy = HealthyScores::default();
     for (sequence, scores) in data.sequences.iter().zip(scores) {
-        let onset_s = onsets_s
-            .get(&sequence.scenario)
-            .copied()
-            .unwrap_or(f64::INFINITY);
-        let settled_s = sequence.steps.first().map_or(0.0, |s| s.time_s) + SETTLING_S;
-        let before = sequence
-            .steps
-            .iter()
-            .zip(scores)
-            .take_while(|(s, _)| s.time_s < onset_s)
-            .skip_while(|(s, _)| s.time_s < settled_s);
+        let onset_s = onsets_s.get(&sequence.scenario).copied();
+        let onset_s = onset_s.unwrap_or(f64::INFINITY);
+        let steps = sequence.steps.iter().zip(scores);
+        let before = steps.take_while(|(s, _)| s.time_s < onset_s);
         let judged: Vec<f64> = before.filter_map(|(_, score)| *score).collect();
         healthy.add(&judged, interval_s, (ALARM_S / interval_s) as usize);
     }
-    healthy
 }

@@ -3,6 +3,7 @@
 pub mod consistency;
 pub mod front_ends;
 pub mod levels;
+pub mod monitors;
 pub mod sensitivity;
 pub mod starts;
 pub mod threshold;

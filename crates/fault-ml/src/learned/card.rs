@@ -5,12 +5,12 @@ use serde_json::Value;
 
 use super::calibration::Calibration;
 use super::operating_point::OperatingPoint;
-use super::{FeatureSet, LearnedError};
+use super::{Evidence, FeatureSet, LearnedError};
 
 /// What a card says it is.
 pub const FORMAT: &str = "channel-monitor";
-/// Version of the format that this program writes, and the newest it reads.
-pub const VERSION: u64 = 1;
+/// Version of the format that this program writes and reads.
+pub const VERSION: u64 = 2;
 
 /// Which kind of model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -65,6 +65,9 @@ pub struct Card {
     pub decide_every: usize,
     /// From its raw score to log-odds.
     pub calibration: Calibration,
+    /// Log-odds beyond which those of a step are evidence that gathers over steps; absent: every step is judged by
+    /// its own.
+    pub evidence_offset: Option<f64>,
     /// Where it alarms.
     pub operating_point: OperatingPoint,
     /// Check sum of the weights (FNV-1a, 64 bits, hexadecimal).
@@ -93,8 +96,9 @@ impl Card {
             .get("version")
             .and_then(Value::as_u64)
             .unwrap_or_default();
-        if version == 0 || version > VERSION {
-            let what = format!("version is {version}: expected 1 to {VERSION}");
+        // Those before it learned from other features.
+        if version != VERSION {
+            let what = format!("version is {version}: expected {VERSION}");
             return Err(refuse(what));
         }
         let card: Self =
@@ -117,10 +121,24 @@ impl Card {
         if self.kind == ModelKind::Svm && self.mode == Mode::Streaming {
             return refuse("mode: a support-vector machine has no state to carry");
         }
+        if self
+            .evidence_offset
+            .is_some_and(|offset| !offset.is_finite())
+        {
+            return refuse("evidence_offset: expected a number");
+        }
         if !self.operating_point.threshold.is_finite() {
             return refuse("threshold: expected a number");
         }
         Ok(self.calibration.check()?)
+    }
+
+    /// What gathers over steps, where something does. Twice what an alarm takes is enough to keep.
+    #[must_use]
+    pub fn evidence(&self) -> Option<Evidence> {
+        let largest = 2.0 * self.operating_point.threshold.max(0.0);
+        let offset = self.evidence_offset?;
+        Some(Evidence::new(offset, largest))
     }
 
     /// The text of the card, with a line break at its end.

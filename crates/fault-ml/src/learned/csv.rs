@@ -8,9 +8,9 @@ use crate::Innovation;
 
 /// Columns.
 const HEADER: &str = "scenario,satellite,fault,time_s,code_m,code_sigma_m,rate_mps,rate_sigma_mps,\
-cn0_dbhz,prompt_power,label";
+given_code_m,given_code_sigma_m,given_rate_mps,given_rate_sigma_mps,cn0_dbhz,prompt_power,label";
 /// Number of them.
-const COLUMNS: usize = 11;
+const COLUMNS: usize = 15;
 /// Steps farther apart than this belong to different sequences, s.
 const LONGEST_GAP_S: f64 = 0.15;
 
@@ -22,25 +22,23 @@ pub fn write_csv(data: &Dataset, out: &mut impl Write) -> Result<(), LearnedErro
     writeln!(out, "{HEADER}")?;
     for sequence in &data.sequences {
         for labelled in &sequence.steps {
-            let (step, innovation) = (&labelled.step, &labelled.step.innovation);
+            let step = &labelled.step;
             write!(
                 out,
-                "{},{},{},{},{},{},",
-                sequence.scenario,
-                step.satellite,
-                sequence.fault,
-                labelled.time_s,
-                innovation.code_m,
-                innovation.code_sigma_m
+                "{},{},{},{},",
+                sequence.scenario, step.satellite, sequence.fault, labelled.time_s
             )?;
-            if innovation.rate_sigma_mps.is_finite() {
-                write!(
-                    out,
-                    "{},{},",
-                    innovation.rate_mps, innovation.rate_sigma_mps
-                )?;
-            } else {
-                write!(out, ",,")?;
+            for innovation in [&step.innovation, &step.given_others] {
+                write!(out, "{},{},", innovation.code_m, innovation.code_sigma_m)?;
+                if innovation.rate_sigma_mps.is_finite() {
+                    write!(
+                        out,
+                        "{},{},",
+                        innovation.rate_mps, innovation.rate_sigma_mps
+                    )?;
+                } else {
+                    write!(out, ",,")?;
+                }
             }
             let label = u8::from(labelled.label.is_faulty());
             writeln!(out, "{},{},{label}", step.cn0_dbhz, step.prompt_power)?;
@@ -101,17 +99,16 @@ fn parse(number: usize, line: &str) -> Result<Row<'_>, LearnedError> {
         satellite,
         fault,
         time,
-        code,
-        code_sigma,
-        rate,
-        rate_sigma,
+        ref innovations @ ..,
         cn0,
         power,
         label,
     ] = fields.as_slice()
     else {
-        let found = format!("{} fields", fields.len());
-        return Err(row(number, "row", &found, &format!("{COLUMNS} fields")));
+        return Err(miscounted(number, fields.len()));
+    };
+    let &[c, cs, r, rs, given_c, given_cs, given_r, given_rs] = innovations else {
+        return Err(miscounted(number, fields.len()));
     };
     let real = |name, text: &str| -> Result<f64, LearnedError> {
         let value: Option<f64> = text.parse().ok().filter(|v: &f64| v.is_finite());
@@ -121,10 +118,19 @@ fn parse(number: usize, line: &str) -> Result<Row<'_>, LearnedError> {
         text.parse()
             .map_err(|_| row(number, name, text, "a whole number"))
     };
-    let (rate_mps, rate_sigma_mps) = if rate.is_empty() && rate_sigma.is_empty() {
-        (0.0, f64::INFINITY)
-    } else {
-        (real("rate_mps", rate)?, real("rate_sigma_mps", rate_sigma)?)
+    let innovation = |names: [&'static str; 4], [code, code_sigma, rate, rate_sigma]: [&str; 4]| {
+        let measured = !(rate.is_empty() && rate_sigma.is_empty());
+        let (rate_mps, rate_sigma_mps) = if measured {
+            (real(names[2], rate)?, real(names[3], rate_sigma)?)
+        } else {
+            (0.0, f64::INFINITY)
+        };
+        Ok::<_, LearnedError>(Innovation {
+            code_m: real(names[0], code)?,
+            code_sigma_m: real(names[1], code_sigma)?,
+            rate_mps,
+            rate_sigma_mps,
+        })
     };
     let label = match label {
         "0" => Label::Healthy,
@@ -133,12 +139,19 @@ fn parse(number: usize, line: &str) -> Result<Row<'_>, LearnedError> {
     };
     let step = ChannelStep {
         satellite: whole("satellite", satellite)?,
-        innovation: Innovation {
-            code_m: real("code_m", code)?,
-            code_sigma_m: real("code_sigma_m", code_sigma)?,
-            rate_mps,
-            rate_sigma_mps,
-        },
+        innovation: innovation(
+            ["code_m", "code_sigma_m", "rate_mps", "rate_sigma_mps"],
+            [c, cs, r, rs],
+        )?,
+        given_others: innovation(
+            [
+                "given_code_m",
+                "given_code_sigma_m",
+                "given_rate_mps",
+                "given_rate_sigma_mps",
+            ],
+            [given_c, given_cs, given_r, given_rs],
+        )?,
         cn0_dbhz: real("cn0_dbhz", cn0)?,
         prompt_power: real("prompt_power", power)?,
     };
@@ -149,6 +162,11 @@ fn parse(number: usize, line: &str) -> Result<Row<'_>, LearnedError> {
         label,
     };
     Ok((whole("scenario", scenario)?, fault, labelled))
+}
+
+fn miscounted(line: usize, found: usize) -> LearnedError {
+    let (found, expected) = (format!("{found} fields"), format!("{COLUMNS} fields"));
+    row(line, "row", &found, &expected)
 }
 
 fn row(line: usize, name: &str, found: &str, expected: &str) -> LearnedError {
@@ -170,6 +188,7 @@ mod tests {
             if time_s > 0.03 {
                 step.innovation.rate_mps = 0.0;
                 step.innovation.rate_sigma_mps = f64::INFINITY;
+                step.given_others.code_m = 0.3;
             }
             LabelledStep {
                 time_s,
@@ -203,15 +222,15 @@ mod tests {
 
     #[test]
     fn a_bad_row_is_named() {
-        let good = "1,7,ramp,0.1,1,8,0.1,0.2,45,600,0";
+        let good = "1,7,ramp,0.1,1,8,0.1,0.2,1,8,,,45,600,0";
         let read = |line: &str| read_csv(format!("{HEADER}\n{good}\n{line}\n").as_bytes());
         assert_eq!(read(good).unwrap().steps(), 2);
         for (line, column) in [
             ("1,7,ramp", "row"),
-            ("x,7,ramp,0.1,1,8,0.1,0.2,45,600,0", "scenario"),
-            ("1,7,ramp,0.1,nan,8,0.1,0.2,45,600,0", "code_m"),
-            ("1,7,ramp,0.1,1,8,,0.2,45,600,0", "rate_mps"),
-            ("1,7,ramp,0.1,1,8,0.1,0.2,45,600,2", "label"),
+            ("x,7,ramp,0.1,1,8,0.1,0.2,1,8,,,45,600,0", "scenario"),
+            ("1,7,ramp,0.1,nan,8,0.1,0.2,1,8,,,45,600,0", "code_m"),
+            ("1,7,ramp,0.1,1,8,,0.2,1,8,,,45,600,0", "rate_mps"),
+            ("1,7,ramp,0.1,1,8,0.1,0.2,1,8,,,45,600,2", "label"),
         ] {
             let message = read(line).unwrap_err().to_string();
             assert!(

@@ -3,18 +3,20 @@
 use serde::{Deserialize, Serialize};
 
 use super::ChannelStep;
-use crate::MonitorError;
 use crate::error::within;
+use crate::{Innovation, MonitorError};
 
 /// Most features of a step.
-const WIDEST: usize = 8;
+pub(super) const WIDEST: usize = 10;
 /// Innovations beyond so many deviations say no more than this many.
 const FARTHEST_SIGMAS: f64 = 20.0;
-/// Weight of the newest step in the running means of the code's innovation, of its square and of the
-/// range rate's: memories of 10 and 50 steps, 20 and 25.
+/// Weight of the newest step in the running means of the code's deviation (memories of 10 and 50 steps), of the
+/// range rate's (25) and of the squares of both (20).
 const CODE_SHARES: [f64; 2] = [0.2, 0.04];
-const SQUARE_SHARE: f64 = 0.1;
 const RATE_SHARE: f64 = 0.08;
+const SQUARE_SHARE: f64 = 0.1;
+/// Weight of the newest step in the C/N0 that a channel is used to: 500 steps, ten seconds.
+const USUAL_SHARE: f64 = 0.002;
 /// C/N0 that counts as zero, dB-Hz, and what counts as one, dB.
 const CN0_MIDDLE_DBHZ: f64 = 40.0;
 const DECADE_DB: f64 = 10.0;
@@ -25,9 +27,11 @@ const DECADE_DB: f64 = 10.0;
 pub enum FeatureSet {
     /// Code and carrier innovation as they are, m and m/s (Jiang2017, Zhu2020).
     Paper,
-    /// Both over their predicted deviations, running means of them over their own deviations (a small error
-    /// that lasts stands out there), C/N0, and the power of the last prompt sum against what C/N0 lets
-    /// expect, which answers at once where C/N0 is smoothed.
+    /// Both given the other channels, over their predicted deviations; running means of them and of their squares
+    /// over their own deviations (a small error that lasts stands out there); C/N0, the same against what the
+    /// channel is used to, and the power of the last prompt sum against what C/N0 lets expect, which answers
+    /// at once where C/N0 is smoothed. Of large numbers the inverse hyperbolic sine: they keep their order
+    /// without drowning the others.
     Full,
 }
 
@@ -52,7 +56,7 @@ impl FeatureSet {
     pub const fn width(self) -> usize {
         match self {
             Self::Paper => 2,
-            Self::Full => 8,
+            Self::Full => WIDEST,
         }
     }
 
@@ -71,8 +75,11 @@ impl FeatureSet {
 pub struct FeatureTrack {
     set: FeatureSet,
     code: [f64; 2],
-    square: f64,
     rate: f64,
+    /// Of code and range rate, less one.
+    squares: [f64; 2],
+    /// C/N0 that the channel is used to, about 40 dB-Hz, in tens of decibels.
+    usual_cn0: Option<f64>,
 }
 
 impl FeatureTrack {
@@ -82,8 +89,9 @@ impl FeatureTrack {
         Self {
             set,
             code: [0.0; 2],
-            square: 0.0,
             rate: 0.0,
+            squares: [0.0; 2],
+            usual_cn0: None,
         }
     }
 
@@ -93,61 +101,87 @@ impl FeatureTrack {
     /// [`MonitorError::Value`] where a number of the step is none, or a deviation not above zero; the step
     /// then leaves no trace.
     pub fn next(&mut self, step: &ChannelStep) -> Result<Features, MonitorError> {
-        let innovation = &step.innovation;
-        let code = checked(innovation.code_m, innovation.code_sigma_m, "innovation (m)")?;
-        let measured = innovation.rate_sigma_mps != f64::INFINITY;
-        let rate = if measured {
-            checked(
-                innovation.rate_mps,
-                innovation.rate_sigma_mps,
-                "innovation (m/s)",
-            )?
-        } else {
-            (0.0, 1.0)
-        };
-        let values = match self.set {
-            FeatureSet::Paper => [code.0, rate.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
-            FeatureSet::Full => {
-                let (cn0, power) = strength(step)?;
-                let (code, rate) = (normalised(code), normalised(rate));
-                self.remember(code, measured.then_some(rate));
-                let [short, long] = self.code;
-                let square = self.square / spread(SQUARE_SHARE);
-                let mean_rate = self.rate / spread(RATE_SHARE);
-                let [a, b] = CODE_SHARES;
-                [
-                    code,
-                    rate,
-                    short / spread(a),
-                    long / spread(b),
-                    square,
-                    mean_rate,
-                    cn0,
-                    power,
-                ]
+        let mut values = [0.0; WIDEST];
+        match self.set {
+            FeatureSet::Paper => {
+                let (code, rate) = measured(&step.innovation)?;
+                let rate = rate.map_or(0.0, |rate| rate.0);
+                values
+                    .iter_mut()
+                    .zip([code.0, rate])
+                    .for_each(|(slot, value)| *slot = value as f32);
             }
-        };
+            FeatureSet::Full => {
+                let (code, rate) = measured(&step.given_others)?;
+                let (cn0, power) = strength(step)?;
+                let (code, rate) = (normalised(code), rate.map(normalised));
+                self.remember(code, rate, cn0);
+                let full = self.full(code, rate.unwrap_or_default(), cn0, power);
+                values = full.map(|value| value as f32);
+            }
+        }
         Ok(Features {
-            values: values.map(|value| value as f32),
+            values,
             width: self.set.width(),
         })
     }
 
-    fn remember(&mut self, code: f64, rate: Option<f64>) {
+    fn full(&self, code: f64, rate: f64, cn0: f64, power: f64) -> [f64; WIDEST] {
+        let [short, long] = self.code;
+        let [short_share, long_share] = CODE_SHARES;
+        let [code_square, rate_square] = self.squares;
+        [
+            code.asinh(),
+            rate.asinh(),
+            (short / spread(short_share)).asinh(),
+            (long / spread(long_share)).asinh(),
+            (code_square / spread(SQUARE_SHARE)).asinh(),
+            (self.rate / spread(RATE_SHARE)).asinh(),
+            (rate_square / spread(SQUARE_SHARE)).asinh(),
+            cn0,
+            cn0 - self.usual_cn0.unwrap_or(cn0),
+            power,
+        ]
+    }
+
+    fn remember(&mut self, code: f64, rate: Option<f64>, cn0: f64) {
         for (mean, share) in self.code.iter_mut().zip(CODE_SHARES) {
             *mean += share * (code - *mean);
         }
-        // About what it is in a healthy channel.
-        self.square += SQUARE_SHARE * (code * code - 1.0 - self.square);
         if let Some(rate) = rate {
             self.rate += RATE_SHARE * (rate - self.rate);
         }
+        // About what they are in a healthy channel.
+        for (mean, value) in self.squares.iter_mut().zip([Some(code), rate]) {
+            if let Some(value) = value {
+                *mean += SQUARE_SHARE * (value * value - 1.0 - *mean);
+            }
+        }
+        let usual = self.usual_cn0.get_or_insert(cn0);
+        *usual += USUAL_SHARE * (cn0 - *usual);
     }
 }
 
 /// Deviation of a running mean of independent values of deviation one.
 fn spread(share: f64) -> f64 {
     (share / (2.0 - share)).sqrt()
+}
+
+/// Value and deviation.
+type Measured = (f64, f64);
+
+/// Code, and rate where there is one.
+fn measured(innovation: &Innovation) -> Result<(Measured, Option<Measured>), MonitorError> {
+    let code = checked(innovation.code_m, innovation.code_sigma_m, "innovation (m)")?;
+    if innovation.rate_sigma_mps == f64::INFINITY {
+        return Ok((code, None));
+    }
+    let rate = checked(
+        innovation.rate_mps,
+        innovation.rate_sigma_mps,
+        "innovation (m/s)",
+    )?;
+    Ok((code, Some(rate)))
 }
 
 fn checked(value: f64, sigma: f64, name: &'static str) -> Result<(f64, f64), MonitorError> {
@@ -197,12 +231,20 @@ mod tests {
         // 2 x 8 m and -3 x 0.2 m/s.
         assert_eq!(paper.values(), [16.0, -0.6_f32]);
         let full = features(FeatureSet::Full);
-        assert_eq!(full.values()[..2], [2.0, -3.0]);
-        // 0.2 of 2 over a deviation of sqrt(0.2 / 1.8) = 1/3.
-        assert!((full.values()[2] - 1.2).abs() < 1e-6);
-        assert_eq!(full.values()[6], 0.5);
-        // log10(601 / 200) - 0.5.
-        assert!((full.values()[7] + 0.0221).abs() < 1e-4);
+        // 0.2 of 2 over a deviation of sqrt(0.2 / 1.8) = 1/3; log10(601 / 200) - 0.5.
+        for (index, expected) in [
+            (0, 2.0_f32.asinh()),
+            (1, -3.0_f32.asinh()),
+            (2, 1.2_f32.asinh()),
+            (7, 0.5),
+            (8, 0.0),
+            (9, -0.0221),
+        ] {
+            assert!(
+                (full.values()[index] - expected).abs() < 1e-4,
+                "{index}: {full:?}"
+            );
+        }
         for set in [FeatureSet::Paper, FeatureSet::Full] {
             assert_eq!(features(set).values().len(), set.width());
         }
@@ -222,7 +264,7 @@ mod tests {
             );
             let features = track.next(&step).unwrap();
             for (sum, k) in sums.iter_mut().zip([2, 3, 5]) {
-                *sum += f64::from(features.values()[k]).powi(2);
+                *sum += f64::from(features.values()[k]).sinh().powi(2);
             }
         }
         for sum in sums {
@@ -235,6 +277,7 @@ mod tests {
     fn without_a_range_rate_it_is_the_one_expected() {
         let mut step = ChannelStep::normal(7, 1.0, 5.0);
         step.innovation.rate_sigma_mps = f64::INFINITY;
+        step.given_others.rate_sigma_mps = f64::INFINITY;
         for set in [FeatureSet::Paper, FeatureSet::Full] {
             let features = FeatureTrack::new(set).next(&step).unwrap();
             assert_eq!(features.values()[1], 0.0);
@@ -246,13 +289,16 @@ mod tests {
         /// What makes a step unusable, and how the error begins.
         type Spoiled<'a> = (fn(&mut ChannelStep), &'a str);
         let spoil: [Spoiled; 5] = [
-            (|s| s.innovation.code_m = f64::NAN, "innovation (m) is NaN"),
             (
-                |s| s.innovation.rate_mps = f64::INFINITY,
+                |s| s.given_others.code_m = f64::NAN,
+                "innovation (m) is NaN",
+            ),
+            (
+                |s| s.given_others.rate_mps = f64::INFINITY,
                 "innovation (m/s) is inf",
             ),
             (
-                |s| s.innovation.code_sigma_m = 0.0,
+                |s| s.given_others.code_sigma_m = 0.0,
                 "deviation of an innovation is 0",
             ),
             (|s| s.cn0_dbhz = f64::NAN, "C/N0 (dB-Hz) is NaN"),

@@ -3,12 +3,14 @@
 use std::sync::Arc;
 
 use super::card::Mode;
+use super::feature::WIDEST;
 use super::lstm::LstmState;
 use super::model::{LearnedModel, Network};
-use super::{ChannelStep, FeatureTrack, SlidingWindow};
+use super::{ChannelStep, Evidence, FeatureTrack, SlidingWindow};
 use crate::{Cadence, ChannelMonitor, ChannelVerdict, Judgement, MonitorError};
 
-/// Judges a channel by a trained model; the score is the log-odds of a fault.
+/// Judges a channel by a trained model; the score is the log-odds of a fault, or the evidence for one that has
+/// gathered.
 ///
 /// It warms up over the model's window, and again when the channel is handed to another satellite. A step
 /// that holds no numbers is refused and leaves no trace.
@@ -22,7 +24,8 @@ pub struct LearnedMonitor {
     seen: usize,
     /// Steps until it judges anew.
     due: usize,
-    log_odds: f64,
+    evidence: Option<Evidence>,
+    score: f64,
 }
 
 /// What it keeps of the past.
@@ -50,6 +53,7 @@ impl LearnedMonitor {
                 Memory::Window(window, state)
             }
         };
+        let evidence = card.evidence();
         Self {
             track: FeatureTrack::new(card.features),
             model,
@@ -57,7 +61,8 @@ impl LearnedMonitor {
             memory,
             seen: 0,
             due: 0,
-            log_odds: 0.0,
+            evidence,
+            score: 0.0,
         }
     }
 
@@ -68,7 +73,7 @@ impl LearnedMonitor {
     }
 
     /// Takes a step and, where one is due, returns the raw score.
-    fn score(&mut self, step: &ChannelStep) -> Result<Option<f32>, MonitorError> {
+    fn raw_score(&mut self, step: &ChannelStep) -> Result<Option<f32>, MonitorError> {
         let features = if self.satellite == Some(step.satellite) {
             self.track.next(step)?
         } else {
@@ -90,7 +95,7 @@ impl LearnedMonitor {
         let scaled = model.scaler().scaled(&features);
         Ok(match (&mut self.memory, model.network()) {
             (Memory::State(state), Network::Lstm(cell)) => {
-                let mut row = [0.0; 16];
+                let mut row = [0.0; WIDEST];
                 let row = row.get_mut(..model.scaler().width()).unwrap_or_default();
                 row.iter_mut()
                     .zip(scaled)
@@ -124,10 +129,12 @@ impl ChannelMonitor for LearnedMonitor {
     }
 
     fn step(&mut self, input: &ChannelStep) -> Result<ChannelVerdict, MonitorError> {
-        let raw = self.score(input)?;
+        let raw = self.raw_score(input)?;
         let card = self.model.card();
         if let Some(raw) = raw {
-            self.log_odds = card.calibration.log_odds(f64::from(raw));
+            let log_odds = card.calibration.log_odds(f64::from(raw));
+            let evidence = self.evidence.as_mut();
+            self.score = evidence.map_or(log_odds, |evidence| evidence.gather(log_odds));
         }
         if self.seen < card.window {
             let remaining_steps = card.window - self.seen;
@@ -135,8 +142,7 @@ impl ChannelMonitor for LearnedMonitor {
         }
         let threshold = card.operating_point.threshold;
         Ok(ChannelVerdict::Judged(Judgement::new(
-            self.log_odds,
-            threshold,
+            self.score, threshold,
         )?))
     }
 
@@ -147,6 +153,9 @@ impl ChannelMonitor for LearnedMonitor {
         }
         self.track = FeatureTrack::new(self.model.card().features);
         self.satellite = None;
+        if let Some(evidence) = &mut self.evidence {
+            evidence.clear();
+        }
         self.seen = 0;
         self.due = 0;
     }

@@ -23,6 +23,7 @@ fn card(kind: ModelKind, mode: Mode, window: usize) -> Card {
             slope: 2.0,
             offset: 0.5,
         },
+        evidence_offset: None,
         operating_point: OperatingPoint {
             threshold: 1.0,
             false_alarms_per_hour: 0.01,
@@ -96,8 +97,8 @@ fn files_that_are_no_models_are_refused_by_what_is_wrong() {
     );
     refused(
         &weights,
-        &with("version", json!(2)),
-        "model card: version is 2: expected 1 to 1",
+        &with("version", json!(3)),
+        "model card: version is 3: expected 2",
     );
     refused(
         &weights,

@@ -44,6 +44,12 @@ impl HealthyScores {
         }
     }
 
+    /// Takes those of other channels.
+    pub fn join(&mut self, other: Self) {
+        self.peaks.extend(other.peaks);
+        self.hours += other.hours;
+    }
+
     /// Channel-hours taken.
     #[must_use]
     pub const fn hours(&self) -> f64 {

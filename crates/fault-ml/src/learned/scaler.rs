@@ -5,7 +5,7 @@ use crate::MonitorError;
 use crate::error::within;
 
 /// Scaled features beyond this many deviations say no more than this many.
-const FARTHEST: f32 = 5.0;
+const FARTHEST: f32 = 8.0;
 
 /// Subtracts a mean and divides by a deviation, feature by feature.
 #[derive(Debug, Clone, PartialEq)]
@@ -72,7 +72,7 @@ impl Scaler {
         (&self.means, &self.deviations)
     }
 
-    /// The scaled features, at most 5 either way.
+    /// The scaled features, at most 8 either way.
     pub fn scaled<'a>(&'a self, features: &'a Features) -> impl Iterator<Item = f32> + 'a {
         let by = self.means.iter().zip(&self.deviations);
         features
@@ -107,7 +107,7 @@ mod tests {
             assert!((found - expected).abs() < 1e-6, "{scaled:?}");
         }
         let far: Vec<f32> = scaler.scaled(&features(1e6, 5.0)).collect();
-        assert_eq!(far, [5.0, 0.0]);
+        assert_eq!(far, [8.0, 0.0]);
     }
 
     #[test]

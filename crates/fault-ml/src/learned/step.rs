@@ -9,6 +9,8 @@ pub struct ChannelStep {
     pub satellite: u32,
     /// What the filter did not expect; without a range rate its deviation is infinite.
     pub innovation: Innovation,
+    /// What neither the filter nor the other channels of the epoch expected: without what is common to all.
+    pub given_others: Innovation,
     /// C/N0, smoothed, dB-Hz.
     pub cn0_dbhz: f64,
     /// Power of the last prompt sum over that of its noise, a ratio.
@@ -19,14 +21,16 @@ pub struct ChannelStep {
 impl ChannelStep {
     /// Innovations of so many deviations (8 m, 0.2 m/s) at 45 dB-Hz.
     pub(crate) fn normal(satellite: u32, code: f64, rate: f64) -> Self {
+        let innovation = Innovation {
+            code_m: 8.0 * code,
+            code_sigma_m: 8.0,
+            rate_mps: 0.2 * rate,
+            rate_sigma_mps: 0.2,
+        };
         Self {
             satellite,
-            innovation: Innovation {
-                code_m: 8.0 * code,
-                code_sigma_m: 8.0,
-                rate_mps: 0.2 * rate,
-                rate_sigma_mps: 0.2,
-            },
+            innovation,
+            given_others: innovation,
             cn0_dbhz: 45.0,
             prompt_power: 600.0,
         }

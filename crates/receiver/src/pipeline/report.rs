@@ -176,6 +176,7 @@ pub(super) fn channel(time_s: f64, tracked: &Tracked, navigated: &Navigated) -> 
         range_rate_mps: raw.map(|r| r.range_rate_mps),
         innovation_code_m,
         innovation_rate_mps,
+        shown: None,
         disposition: disposition(satellite, navigated),
         scores: Vec::new(),
     }

@@ -58,6 +58,7 @@ pub(crate) fn channel(time_s: f64, prn: u8) -> ChannelRecord {
         range_rate_mps: Some(-321.5),
         innovation_code_m: None,
         innovation_rate_mps: None,
+        shown: None,
         disposition: Disposition::Use,
         scores: Vec::new(),
     }

@@ -122,6 +122,7 @@ pub(super) fn channel(
                 })
             }),
         },
+        shown: None,
         disposition,
         scores: Vec::new(),
     }

@@ -1,7 +1,7 @@
 //! What is claimed of the runs.
 
 use super::receivers::Variant;
-use super::study::{Case, Run, Study};
+use super::study::{Blockage, Case, Run, Study};
 use crate::reproduce::Check;
 
 /// Error that the paper's receiver must exceed without detection, m.
@@ -43,7 +43,12 @@ pub fn alarm_delay_s(run: &Run, begin_s: f64) -> f64 {
 /// All claims.
 #[must_use]
 pub fn checks(study: &Study) -> Vec<Check> {
-    study.cases.iter().flat_map(of_scenario).collect()
+    let mut checks: Vec<Check> = study.cases.iter().flat_map(of_scenario).collect();
+    for watched in &study.learned {
+        let runs: Vec<&Run> = watched.runs.iter().collect();
+        checks.extend(with_exclusion(&watched.blockage, watched.label, &runs));
+    }
+    checks
 }
 
 fn of_scenario(case: &Case) -> Vec<Check> {
@@ -58,15 +63,15 @@ fn of_scenario(case: &Case) -> Vec<Check> {
         "m",
     )];
     for variant in Variant::ALL.into_iter().filter(|v| v.excludes()) {
-        checks.extend(with_exclusion(case, variant));
+        let runs: Vec<&Run> = case.runs(variant).collect();
+        checks.extend(with_exclusion(&case.blockage, variant.label(), &runs));
     }
     checks
 }
 
-fn with_exclusion(case: &Case, variant: Variant) -> [Check; 4] {
-    let blockage = &case.blockage;
-    let name = |what: &str| format!("scenario {}, {}: {what}", blockage.number, variant.label());
-    let runs = || case.runs(variant);
+fn with_exclusion(blockage: &Blockage, label: &str, runs: &[&Run]) -> [Check; 4] {
+    let name = |what: &str| format!("scenario {}, {label}: {what}", blockage.number);
+    let runs = || runs.iter().copied();
     let worst_m = largest(runs().map(Run::largest_m));
     let held = Check::at_most(name("largest error of any run"), worst_m, HELD_M, "m");
     let delay_s = largest(runs().map(|run| alarm_delay_s(run, blockage.begin_s)));

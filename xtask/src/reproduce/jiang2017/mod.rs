@@ -1,8 +1,9 @@
-//! `Jiang2017`: vector tracking while a satellite is blocked, without detection and with the innovation
-//! test.
+//! `Jiang2017`: vector tracking while a satellite is blocked, without detection, with the innovation test
+//! and with trained monitors.
 
 pub mod checks;
 pub mod figures;
+pub mod learned;
 pub mod receivers;
 pub mod report;
 pub mod study;
@@ -24,7 +25,11 @@ const SEEDS: usize = 8;
 /// Where a signal, a run or a picture cannot be made.
 pub fn reproduce(making: Making) -> Result<Outcome> {
     let level = making.level.unwrap_or(Level::If);
-    let study = Study::run(level, making.seeds.unwrap_or(SEEDS))?;
+    let seeds = making.seeds.unwrap_or(SEEDS);
+    let study = Study {
+        learned: learned::runs(level, seeds)?,
+        ..Study::run(level, seeds)?
+    };
     let checks = checks::checks(&study);
     Ok(Outcome {
         paper: "jiang2017",

@@ -5,6 +5,7 @@ use gnss_nav::SatelliteId;
 use nalgebra::Vector3;
 use receiver::record::{Event, EventKind, Lock, LoopMembership};
 
+use super::learned::WatchedRuns;
 use super::receivers::Variant;
 use crate::judged::{self, Judged};
 use crate::scenario::built::Scenario;
@@ -12,7 +13,7 @@ use crate::scenario::catalogue;
 use crate::scenario::make::Level;
 
 /// First seed of a scenario's runs.
-const FIRST_SEED: u64 = 50;
+pub const FIRST_SEED: u64 = 50;
 /// Errors count from so long after the navigation filter took over, s: it starts from least squares, whose
 /// error fades by then.
 pub const SETTLING_S: f64 = 5.0;
@@ -161,6 +162,8 @@ pub struct Study {
     pub level: Level,
     /// Both scenarios.
     pub cases: Vec<Case>,
+    /// The receivers watched by trained monitors; none where they were not asked for.
+    pub learned: Vec<WatchedRuns>,
 }
 
 impl Study {
@@ -182,6 +185,7 @@ impl Study {
         Ok(Self {
             level,
             cases: cases.map(case).collect(),
+            learned: Vec::new(),
         })
     }
 }

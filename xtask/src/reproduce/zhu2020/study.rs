@@ -13,25 +13,13 @@ use crate::reproduce::jiang2017::receivers::Variant;
 use crate::scenario::built::Scenario;
 use crate::scenario::catalogue;
 use crate::scenario::make::Level;
-use crate::train::fit::calibrated;
 use crate::train::paper::{self, Accuracy};
 
-/// First seeds of what is learned from and of what is judged by: no scenario is in both.
-const LEARNED_FROM: u64 = 1;
-const JUDGED_BY: u64 = 1_000_001;
-/// Part of what is learned from that is held out, to stop by.
-const HELD_OUT: f64 = 0.25;
-/// The paper's numbers of innovations, of the LSTM and of the machine.
-pub const LSTM_LENGTH: usize = 50;
-/// That of Jiang2017.
-pub const SVM_LENGTH: usize = 30;
 /// When the satellite is switched off, s, and which.
 pub const OFF_S: f64 = 80.0;
 const OFF_PRN: u8 = 17;
 /// Errors count from so long after the filter took over, s.
 pub const SETTLING_S: f64 = 5.0;
-/// False alarms of a channel an hour in the flight.
-const FLIGHT_ALARMS_PER_HOUR: f64 = 0.1;
 
 /// Trainings of one kind and length.
 #[derive(Debug, Clone)]
@@ -95,8 +83,8 @@ impl Study {
     /// # Errors
     /// Where a run or a training fails.
     pub fn run(level: Level, seeds: usize, lengths: &[usize], trainings: u64) -> Result<Self> {
-        let split = paper::harvest(seeds, LEARNED_FROM, Level::Correlator)?.split(HELD_OUT, 0.0, 1);
-        let judges = paper::harvest(seeds.div_ceil(2), JUDGED_BY, level)?;
+        let split = paper::lessons(seeds)?;
+        let judges = paper::harvest(seeds.div_ceil(2), paper::JUDGED_BY, level)?;
         let cells = curve(&split, &judges, lengths, trainings)?;
         Ok(Self {
             level,
@@ -123,7 +111,10 @@ fn curve(split: &Split, judges: &Dataset, lengths: &[usize], trainings: u64) -> 
         .collect();
     judged::in_parallel(all.len(), |number| {
         let (kind, length) = all[number];
-        let train = |seed| paper::accuracy(&paper::fit(kind, length, split, seed)?, judges);
+        let train = |seed| {
+            let model = paper::fit(kind, length, split, seed)?;
+            paper::accuracy(&model, &split.validation, judges)
+        };
         let trainings = (1..=trainings).map(train).collect::<Result<_>>()?;
         Ok(Cell {
             kind,
@@ -152,14 +143,10 @@ fn settings(scenario: &Scenario, model: Option<LearnedModel>) -> Settings {
 
 fn flights(split: &Split, level: Level) -> Result<Vec<Flight>> {
     let scenario = Scenario::new(&catalogue::find("zhu2020")?, None)?;
-    let trained = |kind, length| -> Result<LearnedModel> {
-        let model = paper::fit(kind, length, split, 1)?;
-        calibrated(model, &split.validation, FLIGHT_ALARMS_PER_HOUR)
-    };
     let monitors = [
         ("without detection", None),
-        ("LSTM of 50", Some(trained(ModelKind::Lstm, LSTM_LENGTH)?)),
-        ("SVM of 30", Some(trained(ModelKind::Svm, SVM_LENGTH)?)),
+        ("LSTM of 50", Some(paper::monitor(ModelKind::Lstm, split)?)),
+        ("SVM of 30", Some(paper::monitor(ModelKind::Svm, split)?)),
     ];
     let (labels, models): (Vec<_>, Vec<_>) = monitors.into_iter().unzip();
     let settings: Vec<Settings> = models.into_iter().map(|m| settings(&scenario, m)).collect();

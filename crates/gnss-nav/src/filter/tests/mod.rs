@@ -3,6 +3,7 @@
 mod consistency;
 mod equivalence;
 mod fault_logic;
+mod given_others;
 mod golden;
 mod jacobian;
 mod reference;

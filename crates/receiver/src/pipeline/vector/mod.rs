@@ -16,6 +16,7 @@ mod watch;
 
 use std::collections::BTreeMap;
 
+use fault_ml::learned::ChannelStep;
 use gnss_nav::coarse_time::SnapshotSolution;
 use gnss_nav::filter::{
     Advice, Disposition, EpochGeometry, FaultLogic, FaultThresholds, Innovations, NavFilter,
@@ -37,6 +38,7 @@ use crate::record::EventKind;
 use acceleration::Velocities;
 use filter::from_solution;
 pub(super) use monitors::Monitor;
+use monitors::deviations;
 pub(super) use report::observations;
 pub use settings::{FilterKind, MeasurementNoise, Policy, VectorSettings};
 pub(super) use steering::steering;
@@ -90,6 +92,8 @@ pub(super) struct Member {
     pub(super) epoch: ChannelEpoch,
     pub(super) raw: Option<RawMeasurement>,
     pub(super) innovation: Option<SatelliteInnovation>,
+    /// What its monitors were shown.
+    pub(super) shown: Option<ChannelStep>,
     /// What the filter was told of it; `None` where it had nothing to be told of.
     pub(super) disposition: Option<Disposition>,
     /// Whether the filter used its pseudorange.
@@ -311,6 +315,7 @@ impl VectorTracking {
             epoch,
             raw,
             innovation: None,
+            shown: None,
             disposition: None,
             used: false,
             expected,
@@ -390,12 +395,19 @@ impl VectorTracking {
     ) -> Result<Vec<(SatelliteId, Disposition)>, ReceiverError> {
         let policy = self.settings.policy;
         let mut dispositions = Vec::new();
-        for innovation in innovations.satellites() {
+        let believed = |satellite| {
+            let watch = self.watches.get(&satellite);
+            watch.is_none_or(|watch| !watch.is_suspended())
+        };
+        let given = deviations(innovations, &self.filter.covariance(), believed)?;
+        for (innovation, given) in innovations.satellites().iter().zip(&given) {
             let satellite = innovation.satellite;
-            let Some(member) = epoch.members.iter().find(|m| m.satellite == satellite) else {
+            let mut members = epoch.members.iter_mut();
+            let Some(member) = members.find(|m| m.satellite == satellite) else {
                 continue;
             };
-            let step = monitors::step(innovation, &member.epoch);
+            let step = monitors::step(innovation, given, &member.epoch);
+            member.shown = Some(step);
             let watch = self.watch(satellite);
             let change = watch.judge(&step)?;
             dispositions.push((satellite, watch.disposition(policy)));

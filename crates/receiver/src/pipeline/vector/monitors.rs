@@ -2,7 +2,10 @@
 
 use fault_ml::learned::{ChannelStep, LearnedMonitor};
 use fault_ml::{ChannelMonitor, ChannelVerdict, Innovation, InnovationTest};
-use gnss_nav::filter::SatelliteInnovation;
+use gnss_nav::SatelliteId;
+use gnss_nav::filter::{
+    self, Covariance, Deviation, GivenOthers, Innovations, SatelliteInnovation,
+};
 use gnss_signal::tracking::ChannelEpoch;
 
 use crate::ReceiverError;
@@ -46,20 +49,73 @@ impl Monitor {
     }
 }
 
+/// A deviation from what the others say, beyond which a satellite is not one of the others, in deviations.
+const CONTRADICTS_SIGMAS: f64 = 6.0;
+/// Satellites that tell what to expect of another one, at least.
+const FEWEST_OTHERS: usize = 5;
+
+/// Every satellite's innovations given those of the others that are `believed` and do not contradict the rest:
+/// one that does would show in the deviations of all.
+pub(super) fn deviations(
+    innovations: &Innovations,
+    covariance: &Covariance,
+    believed: impl Fn(SatelliteId) -> bool,
+) -> Result<Vec<GivenOthers>, ReceiverError> {
+    let all = innovations.satellites().iter().map(|s| s.satellite);
+    let mut others: Vec<SatelliteId> = all.filter(|s| believed(*s)).collect();
+    loop {
+        let given = innovations.given_others(covariance, |s| others.contains(&s))?;
+        let heard = given.iter().filter(|g| others.contains(&g.satellite));
+        let farthest = heard.max_by(|a, b| distance2(a).total_cmp(&distance2(b)));
+        match farthest {
+            Some(farthest)
+                if distance2(farthest) > CONTRADICTS_SIGMAS * CONTRADICTS_SIGMAS
+                    && others.len() > FEWEST_OTHERS =>
+            {
+                let contradicts = farthest.satellite;
+                others.retain(|s| *s != contradicts);
+            }
+            _ => return Ok(given),
+        }
+    }
+}
+
+/// The larger of the normalised deviations, squared.
+fn distance2(given: &GivenOthers) -> f64 {
+    let square = |d: &Deviation| d.value * d.value / d.variance;
+    given
+        .rate
+        .as_ref()
+        .map_or(0.0, square)
+        .max(square(&given.code))
+}
+
 /// What the monitors of a channel are shown of an epoch.
-pub(super) fn step(innovation: &SatelliteInnovation, epoch: &ChannelEpoch) -> ChannelStep {
-    let (rate_mps, rate_sigma_mps) = innovation.rate.map_or((0.0, f64::INFINITY), |rate| {
-        (rate.value(), rate.variance().sqrt())
-    });
+pub(super) fn step(
+    innovation: &SatelliteInnovation,
+    given: &GivenOthers,
+    epoch: &ChannelEpoch,
+) -> ChannelStep {
+    let number = |i: &filter::Innovation| (i.value(), i.variance());
+    let deviation = |d: &Deviation| (d.value, d.variance);
+    let rate = innovation.rate.as_ref().map(number);
+    let given_rate = given.rate.as_ref().map(deviation);
     ChannelStep {
         satellite: innovation.satellite.prn.into(),
-        innovation: Innovation {
-            code_m: innovation.code.value(),
-            code_sigma_m: innovation.code.variance().sqrt(),
-            rate_mps,
-            rate_sigma_mps,
-        },
+        innovation: pair(number(&innovation.code), rate),
+        given_others: pair(deviation(&given.code), given_rate),
         cn0_dbhz: epoch.cn0_dbhz,
         prompt_power: epoch.prompt.norm_sqr(),
+    }
+}
+
+/// Value and variance of a pseudorange and, where there is one, of a range rate.
+fn pair(code: (f64, f64), rate: Option<(f64, f64)>) -> Innovation {
+    let (rate_mps, rate_variance) = rate.unwrap_or((0.0, f64::INFINITY));
+    Innovation {
+        code_m: code.0,
+        code_sigma_m: code.1.sqrt(),
+        rate_mps,
+        rate_sigma_mps: rate_variance.sqrt(),
     }
 }

@@ -89,6 +89,7 @@ impl VectorTracking {
             range_rate_mps: member.raw.map(|r| r.range_rate_mps),
             innovation_code_m: code,
             innovation_rate_mps: rate,
+            shown: member.shown,
             disposition: disposition(member.disposition),
             scores: watch.map(scores).unwrap_or_default(),
         }

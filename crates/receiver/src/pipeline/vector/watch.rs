@@ -114,6 +114,11 @@ impl Watch {
         })
     }
 
+    /// Whether it is not believed.
+    pub(super) const fn is_suspended(&self) -> bool {
+        self.suspended.is_some()
+    }
+
     /// What the filter is to do with the satellite.
     pub(super) const fn disposition(&self, policy: Policy) -> Disposition {
         match (self.suspended, policy) {

@@ -1,0 +1,68 @@
+//! Evidence gathered over the steps of a channel.
+//!
+//! The log-odds of a step have an end: a model is no surer than the examples it has seen let it be, and a rare
+//! enough alarm lies beyond. Their sum has none. The cumulative sum (Page1954) grows as long as a fault lasts and
+//! starts anew where nothing speaks for one.
+
+/// The largest sum of log-odds less an offset over all stretches of steps that end now:
+/// S(k) = z(k) - offset + max(0, S(k - 1)).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Evidence {
+    offset: f64,
+    largest: f64,
+    sum: f64,
+}
+
+impl Evidence {
+    /// None yet. Log-odds count as far as they exceed `offset`; no more than `largest` is kept, so that it is
+    /// forgotten in good time once a fault has passed.
+    #[must_use]
+    pub const fn new(offset: f64, largest: f64) -> Self {
+        Self {
+            offset,
+            largest,
+            sum: 0.0,
+        }
+    }
+
+    /// Takes the log-odds of the next step and returns the sum.
+    pub fn gather(&mut self, log_odds: f64) -> f64 {
+        self.sum = (log_odds - self.offset + self.sum.max(0.0)).min(self.largest);
+        self.sum
+    }
+
+    /// Forgets everything.
+    pub const fn clear(&mut self) {
+        self.sum = 0.0;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        #[test]
+        fn it_is_the_largest_sum_that_ends_now(odds in prop::collection::vec(-4.0..4.0f64, 1..30)) {
+            let mut evidence = Evidence::new(0.5, f64::INFINITY);
+            for k in 0..odds.len() {
+                let found = evidence.gather(odds[k]);
+                let sum = |j: usize| odds[j..=k].iter().map(|z| z - 0.5).sum::<f64>();
+                let expected = (0..=k).map(sum).fold(f64::NEG_INFINITY, f64::max);
+                // Sums in another order: 30 roundings of numbers below 200.
+                prop_assert!((found - expected).abs() < 1e-11);
+            }
+            evidence.clear();
+            prop_assert_eq!(evidence, Evidence::new(0.5, f64::INFINITY));
+        }
+    }
+
+    #[test]
+    fn no_more_is_kept_than_said() {
+        let mut evidence = Evidence::new(1.0, 6.0);
+        let sums = [5.0, 5.0, -2.0, -2.0, -2.0].map(|z| evidence.gather(z));
+        assert_eq!(sums, [4.0, 6.0, 3.0, 0.0, -3.0]);
+    }
+}
