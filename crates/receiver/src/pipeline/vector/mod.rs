@@ -18,16 +18,17 @@ use gnss_nav::filter::{
     Advice, Disposition, EpochGeometry, FaultLogic, FaultThresholds, Innovations, NavFilter,
     Observable, SatelliteInnovation, SkipReason, Update,
 };
+use gnss_nav::integrity::{self, IntegritySettings};
+use gnss_nav::least_squares::Consistency;
 use gnss_nav::measurement::form;
 use gnss_nav::prediction::Expected;
 use gnss_nav::{
     EphemerisStore, GpsTime, Measurement, MeasurementModel, NavState, RawMeasurement, SatelliteId,
-    Solution, least_squares,
+    Solution,
 };
 use gnss_signal::tracking::{ChannelEpoch, Lock};
 use nalgebra::Vector3;
 
-use super::navigator::EXCLUSION_FALSE_ALARM;
 use super::slot::Slot;
 use crate::ReceiverError;
 use crate::record::EventKind;
@@ -55,6 +56,8 @@ const TIME_DISAGREES_S: f64 = 0.5e-3;
 const CONTRADICTING: usize = 2;
 /// An acceleration below two deviations of its noise is none: fed back, noise would grow.
 const SIGNIFICANT_SIGMAS2: f64 = 4.0;
+/// Satellites a fix to start anew from may leave out: most channels may contradict the filter.
+const MOST_FAULTS: usize = 4;
 /// Past this deviation of a predicted range, m, a signal is likely to lie outside the taps: half a
 /// chip.
 const LOST_M: f64 = 150.0;
@@ -445,15 +448,16 @@ impl VectorTracking {
         channels: usize,
         epoch: &mut Epoch,
     ) -> Result<(), ReceiverError> {
-        let solved = least_squares::solve_with_exclusion(
-            measurements,
-            &self.model,
-            &self.state().position_ecef_m,
-            EXCLUSION_FALSE_ALARM,
-        );
+        let settings = IntegritySettings {
+            most_faults: MOST_FAULTS,
+            ..IntegritySettings::default()
+        };
+        let start = &self.state().position_ecef_m;
+        let solved = integrity::solve(measurements, &self.model, start, &settings);
         self.faults.clear();
-        let consistent = |s: &Solution| s.consistency == least_squares::Consistency::Passed;
-        let Some(solution) = solved.ok().filter(consistent) else {
+        let solved = solved.ok().map(|assured| assured.solution);
+        let consistent = |s: &Solution| s.consistency == Consistency::Passed;
+        let Some(solution) = solved.filter(consistent) else {
             self.outlook = Outlook::Contradicted;
             return Ok(());
         };
