@@ -8,6 +8,7 @@ use gnss_signal::CorrelatorBank;
 use super::navigator::Tracked;
 use super::report;
 use super::run::{Fixed, Run};
+use super::slot::Slot;
 use crate::ReceiverError;
 use crate::record::{EventKind, PvtRecord, Record};
 
@@ -15,14 +16,7 @@ impl<B: CorrelatorBank> Run<'_, B> {
     /// Position, velocity and time of this epoch by least squares, and all its records.
     pub(super) fn navigate(&mut self, now: u64) -> Result<(), ReceiverError> {
         let time_s = self.time_s(now);
-        let mut tracked: Vec<Tracked> = self
-            .slots
-            .iter_mut()
-            .filter_map(|slot| {
-                let epoch = slot.channel.epoch(now)?;
-                Some(Tracked { slot, epoch })
-            })
-            .collect();
+        let mut tracked = tracked(now, &mut self.slots);
         let navigated = self.navigator.navigate(now, &mut tracked);
         let observations = report::observations(time_s, &mut tracked, &navigated);
         if let Some(observations) = observations {
@@ -85,4 +79,13 @@ impl<B: CorrelatorBank> Run<'_, B> {
         }
         Ok(())
     }
+}
+
+/// The channels that have something to say at `now`.
+pub(super) fn tracked(now: u64, slots: &mut [Slot]) -> Vec<Tracked<'_>> {
+    let said = slots.iter_mut().filter_map(|slot| {
+        let epoch = slot.channel.epoch(now)?;
+        Some(Tracked { slot, epoch })
+    });
+    said.collect()
 }
