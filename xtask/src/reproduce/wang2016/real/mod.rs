@@ -119,6 +119,8 @@ struct Plan {
     threshold: f64,
     /// On the stated deviations.
     factor: f64,
+    /// Whether it is tried at the stated rate of false alarms, too: minutes for a swarm.
+    is_calibrated: bool,
 }
 
 fn plans(record: &Record) -> Result<Vec<Plan>> {
@@ -133,6 +135,7 @@ fn plans(record: &Record) -> Result<Vec<Plan>> {
         kind,
         threshold,
         factor: 1.0,
+        is_calibrated: true,
     };
     let particle = |label, parameters: ParticleParameters| {
         plan(label, Kind::Particle(parameters), parameters.threshold)
@@ -144,10 +147,14 @@ fn plans(record: &Record) -> Result<Vec<Plan>> {
         particle("PF", bootstrap),
         Plan {
             factor: 1.5,
+            is_calibrated: false,
             ..particle("PF, deviations times 1.5", bootstrap)
         },
         particle("PSO-PF, corrected", corrected),
-        particle("PSO-PF as printed", printed),
+        Plan {
+            is_calibrated: false,
+            ..particle("PSO-PF as printed", printed)
+        },
         plan("least squares, 1e-5 an epoch", Kind::ChiSquare, chi_square),
         plan(
             "GLR on residuals, white noise, 1e-5",
@@ -165,7 +172,7 @@ fn plans(record: &Record) -> Result<Vec<Plan>> {
 /// Threshold that the stated share of clean records exceeds under this noise.
 fn calibrated(record: &Record, kind: Kind, noise: &CorrelatedNoise) -> Result<f64> {
     let calibration = Calibration {
-        runs: 200,
+        runs: 60,
         epochs: record.epochs.len() - WARM_UP,
         false_alarm_share: STATED,
     };
