@@ -119,8 +119,6 @@ struct Plan {
     threshold: f64,
     /// On the stated deviations.
     factor: f64,
-    /// Whether it is tried at the stated rate of false alarms, too: minutes for a swarm.
-    is_calibrated: bool,
 }
 
 fn plans(record: &Record) -> Result<Vec<Plan>> {
@@ -135,7 +133,6 @@ fn plans(record: &Record) -> Result<Vec<Plan>> {
         kind,
         threshold,
         factor: 1.0,
-        is_calibrated: true,
     };
     let particle = |label, parameters: ParticleParameters| {
         plan(label, Kind::Particle(parameters), parameters.threshold)
@@ -147,14 +144,10 @@ fn plans(record: &Record) -> Result<Vec<Plan>> {
         particle("PF", bootstrap),
         Plan {
             factor: 1.5,
-            is_calibrated: false,
             ..particle("PF, deviations times 1.5", bootstrap)
         },
         particle("PSO-PF, corrected", corrected),
-        Plan {
-            is_calibrated: false,
-            ..particle("PSO-PF as printed", printed)
-        },
+        particle("PSO-PF as printed", printed),
         plan("least squares, 1e-5 an epoch", Kind::ChiSquare, chi_square),
         plan(
             "GLR on residuals, white noise, 1e-5",
