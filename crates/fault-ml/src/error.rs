@@ -48,3 +48,19 @@ pub(crate) fn within(
         expected,
     })
 }
+
+/// Seconds from the epoch `last_s` to `time_s`, none where there was none before.
+///
+/// # Errors
+/// Where time has not grown.
+pub(crate) fn check_later(time_s: f64, last_s: Option<f64>) -> Result<Option<f64>, MonitorError> {
+    let elapsed_s = last_s.map(|last_s| time_s - last_s);
+    if time_s.is_finite() && elapsed_s.is_none_or(|elapsed_s| elapsed_s > 0.0) {
+        return Ok(elapsed_s);
+    }
+    Err(MonitorError::Value {
+        name: "time (s)",
+        value: time_s,
+        expected: "a number above that of the epoch before",
+    })
+}

@@ -65,6 +65,7 @@ pub mod metrics;
 mod noise_fit;
 mod noise_model;
 pub mod particle;
+mod readmission;
 mod sight;
 #[cfg(test)]
 mod test_sky;

@@ -11,6 +11,10 @@ const MOST_ITERATIONS: usize = 20;
 /// A step this short ends the search, m.
 const CONVERGED_M: f64 = 1e-4;
 
+/// Farthest an estimate may be from the reference before that follows, m: the linear model still
+/// holds to 0.1 mm there.
+const FARTHEST_STATE_M: f64 = 50.0;
+
 /// Where sights are taken from.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reference {
@@ -33,6 +37,42 @@ impl Reference {
         Self {
             position_ecef_m: std::array::from_fn(|d| self.position_ecef_m[d] + state_m[d]),
             clock_m: self.clock_m + state_m[3],
+        }
+    }
+
+    /// Moves the point by `offset_ecef_m`, m.
+    pub(crate) fn displace(&mut self, offset_ecef_m: &[f64; 3]) {
+        for (own, offset) in self.position_ecef_m.iter_mut().zip(offset_ecef_m) {
+            *own += offset;
+        }
+    }
+
+    /// Moves the point to the position of `state_m` once that is far away; returns what states about
+    /// it then shift by.
+    pub(crate) fn follow_position(&mut self, state_m: &[f64; STATES]) -> Option<[f64; STATES]> {
+        let [x, y, z, _] = *state_m;
+        if (x * x + y * y + z * z).sqrt() <= FARTHEST_STATE_M {
+            return None;
+        }
+        self.displace(&[x, y, z]);
+        Some([-x, -y, -z, 0.0])
+    }
+
+    /// Takes in the clock of an epoch: the median of what `used` leave unexplained at `state_m`, which one
+    /// fault moves little, so that a drift or jump common to all is gone.
+    pub(crate) fn follow_clock<'a>(
+        &mut self,
+        used: impl Iterator<Item = &'a SatelliteMeasurement>,
+        state_m: &[f64; STATES],
+    ) {
+        let mut sorted_m: Vec<f64> = used
+            .map(|m| self.sight(m).residual_about(state_m))
+            .collect();
+        sorted_m.sort_by(f64::total_cmp);
+        let middle = sorted_m.len() / 2;
+        if let Some(upper) = sorted_m.get(middle) {
+            let lower = sorted_m[sorted_m.len() - 1 - middle];
+            self.clock_m += 0.5 * (lower + upper);
         }
     }
 

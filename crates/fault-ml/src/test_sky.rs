@@ -70,6 +70,7 @@ pub(crate) fn sights(designs: &[[f64; 4]], residual_m: impl Fn(u32) -> f64) -> V
 /// White heavy-tailed noise of a deviation of 1.8 m: the detectors overstate it by 3 m.
 pub(crate) const TAILED: CorrelatedNoise = CorrelatedNoise {
     bias_sigma_m: 0.0,
+    bias_tail_share: 0.0,
     markov_sigma_m: 0.0,
     markov_time_s: 1.0,
     white_sigma_m: 1.8,

@@ -101,6 +101,8 @@ fn settings(config: &RunConfig, nav: Option<NavigationFile>) -> Result<Settings,
     Ok(Settings {
         signals: signals?,
         rate_hz: config.rate_hz,
+        raim: config.raim,
+        seed: config.seed,
         elevation_mask_rad: config.elevation_mask_rad,
         ionosphere: config.ionosphere == Ionosphere::Klobuchar,
         troposphere: config.troposphere == Troposphere::Saastamoinen,
@@ -120,7 +122,11 @@ fn monitors(config: &RunConfig) -> Vec<String> {
         .monitors
         .iter()
         .filter(|_| config.mode == Mode::Vector);
-    running.map(|monitor| monitor.name().to_owned()).collect()
+    let names = running.map(|monitor| monitor.name());
+    names
+        .chain(config.raim.scored())
+        .map(str::to_owned)
+        .collect()
 }
 
 fn vector(config: &RunConfig) -> Result<VectorSettings, ReceiverError> {

@@ -1,6 +1,6 @@
 //! Windowed generalised likelihood ratio for a step in one pseudorange (`Willsky1976`).
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 
 use nalgebra::Vector4;
 
@@ -26,6 +26,11 @@ impl Hypothesis {
         correlation: 0.0,
     };
 
+    /// Most likely size of the step, m, and its variance, m^2.
+    fn size(&self) -> (f64, f64) {
+        (self.correlation / self.information, 1.0 / self.information)
+    }
+
     /// The log-likelihood ratio at the most likely size of the step.
     fn ratio(&self) -> f64 {
         if self.information > 0.0 {
@@ -44,20 +49,18 @@ impl Hypothesis {
 #[derive(Debug, Clone)]
 pub struct InnovationGlr {
     filter: KalmanFilter,
-    /// Oldest first; each holds a hypothesis for every satellite.
-    onsets: VecDeque<Vec<Hypothesis>>,
-    satellites: usize,
+    /// Oldest first; each holds a hypothesis for every satellite seen since, by id.
+    onsets: VecDeque<BTreeMap<u32, Hypothesis>>,
     window_epochs: usize,
 }
 
 impl InnovationGlr {
-    /// For `satellites` satellites, always given in the same order.
+    /// Nothing seen yet; steps are sought that began up to `window_epochs` epochs ago.
     #[must_use]
-    pub fn new(parameters: &KalmanParameters, satellites: usize, window_epochs: usize) -> Self {
+    pub fn new(parameters: &KalmanParameters, window_epochs: usize) -> Self {
         Self {
             filter: KalmanFilter::new(parameters),
             onsets: VecDeque::with_capacity(window_epochs + 1),
-            satellites,
             window_epochs,
         }
     }
@@ -68,33 +71,63 @@ impl InnovationGlr {
         self.filter.state_m()
     }
 
-    /// Takes one epoch; returns the ratio of every satellite, maximised over onsets.
-    pub fn epoch(&mut self, sights: &[Sight]) -> Vec<f64> {
+    /// Takes the sights of an epoch `elapsed_s` after the one before; returns the ratio of every
+    /// satellite, maximised over onsets.
+    pub fn epoch(&mut self, elapsed_s: f64, sights: &[Sight]) -> Vec<f64> {
         if self.onsets.len() >= self.window_epochs {
             self.onsets.pop_front();
         }
-        self.onsets
-            .push_back(vec![Hypothesis::NONE; self.satellites]);
-        self.filter.predict();
-        for (row, sight) in sights.iter().enumerate() {
-            let innovation = self.filter.update(sight);
-            let design = Vector4::from(sight.design);
-            for onset in &mut self.onsets {
-                for (satellite, hypothesis) in onset.iter_mut().enumerate() {
-                    let step = if satellite == row { 1.0 } else { 0.0 };
-                    let signature = step - design.dot(&hypothesis.response);
-                    let scaled = signature / innovation.variance_m2;
-                    hypothesis.information += signature * scaled;
-                    hypothesis.correlation += innovation.value_m * scaled;
-                    hypothesis.response += innovation.gain * signature;
-                }
+        self.onsets.push_back(BTreeMap::new());
+        for onset in &mut self.onsets {
+            for sight in sights {
+                onset.entry(sight.id).or_insert(Hypothesis::NONE);
             }
         }
-        let ratio = |satellite: usize| {
-            let onsets = self.onsets.iter().filter_map(|onset| onset.get(satellite));
-            onsets.map(Hypothesis::ratio).fold(0.0, f64::max)
-        };
-        (0..self.satellites).map(ratio).collect()
+        self.filter.predict(elapsed_s);
+        for sight in sights {
+            let innovation = self.filter.update(sight);
+            let design = Vector4::from(sight.design);
+            for (id, hypothesis) in self.onsets.iter_mut().flatten() {
+                let step = if *id == sight.id { 1.0 } else { 0.0 };
+                let signature = step - design.dot(&hypothesis.response);
+                let scaled = signature / innovation.variance_m2;
+                hypothesis.information += signature * scaled;
+                hypothesis.correlation += innovation.value_m * scaled;
+                hypothesis.response += innovation.gain * signature;
+            }
+        }
+        let ratio = |id: u32| self.most_likely(id).map_or(0.0, |h| h.ratio());
+        sights.iter().map(|sight| ratio(sight.id)).collect()
+    }
+
+    /// The most likely step of the satellite `id`.
+    fn most_likely(&self, id: u32) -> Option<&Hypothesis> {
+        let onsets = self.onsets.iter().filter_map(|onset| onset.get(&id));
+        onsets.max_by(|a, b| a.ratio().total_cmp(&b.ratio()))
+    }
+
+    /// Takes out what the most likely step of the satellite `id` has done to the state, and begins
+    /// a new window.
+    pub fn compensate(&mut self, id: u32) {
+        let found = self.most_likely(id).copied();
+        if let Some(step) = found.filter(|h| h.information > 0.0) {
+            let (size_m, variance_m2) = step.size();
+            self.filter.shift(&(-size_m * step.response));
+            self.filter
+                .loosen(&(step.response * step.response.transpose() * variance_m2));
+        }
+        self.onsets.clear();
+    }
+
+    /// Log density (1/m) of a sight the filter has not taken.
+    #[must_use]
+    pub fn log_expectation(&self, sight: &Sight) -> f64 {
+        self.filter.log_expectation(sight)
+    }
+
+    /// Moves the reference point: what was at x is at x + `offset_m` now.
+    pub fn shift(&mut self, offset_m: &[f64; STATES]) {
+        self.filter.shift(&Vector4::from(*offset_m));
     }
 }
 

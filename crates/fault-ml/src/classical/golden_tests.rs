@@ -76,9 +76,9 @@ fn the_kalman_bank_is_the_reference() {
 #[test]
 fn the_innovation_ratio_is_the_reference() {
     let Some(epochs) = epochs() else { return };
-    let mut glr = InnovationGlr::new(&KalmanParameters::default(), 9, 30);
+    let mut glr = InnovationGlr::new(&KalmanParameters::default(), 30);
     for (k, (sights, expected)) in epochs.iter().enumerate() {
-        for (q, ratio) in glr.epoch(sights).into_iter().enumerate() {
+        for (q, ratio) in glr.epoch(1.0, sights).into_iter().enumerate() {
             assert_close(ratio, expected[34 + q], &format!("GLR {q} at {k}"));
         }
     }

@@ -12,7 +12,7 @@ use crate::{MonitorError, STATES, Sight};
 pub struct KalmanParameters {
     /// First standard deviation of every state, m. Default 3.
     pub initial_sigma_m: f64,
-    /// Process noise of every state, m an epoch. Default 0.25.
+    /// Process noise of every state, m per square root of a second. Default 0.25.
     pub process_noise_m: f64,
 }
 
@@ -91,8 +91,22 @@ impl KalmanFilter {
         self.state_m.into()
     }
 
-    pub(super) fn predict(&mut self) {
-        self.covariance_m2 += Matrix4::identity() * self.process_m2;
+    pub(super) fn predict(&mut self, elapsed_s: f64) {
+        self.covariance_m2 += Matrix4::identity() * (elapsed_s * self.process_m2);
+    }
+
+    pub(super) fn shift(&mut self, offset_m: &Vector4<f64>) {
+        self.state_m += offset_m;
+    }
+
+    pub(super) fn loosen(&mut self, covariance_m2: &Matrix4<f64>) {
+        self.covariance_m2 += covariance_m2;
+    }
+
+    /// Log density (1/m) of one more sight of this epoch, without taking it.
+    pub(super) fn log_expectation(&self, sight: &Sight) -> f64 {
+        let mut ahead = *self;
+        ahead.update(sight).log_density()
     }
 
     /// Applies one measurement; by the chain rule its density times those of the measurements
@@ -112,9 +126,9 @@ impl KalmanFilter {
         }
     }
 
-    /// Takes one epoch; returns ln p(measurements) and their normalised innovation squared.
+    /// Takes one epoch, a second after the last; returns ln p(measurements) and their normalised innovation squared.
     pub fn epoch<'a>(&mut self, sights: impl Iterator<Item = &'a Sight>) -> (f64, f64) {
-        self.predict();
+        self.predict(1.0);
         sights.fold((0.0, 0.0), |(log, squares), sight| {
             let innovation = self.update(sight);
             let square = innovation.value_m * innovation.value_m / innovation.variance_m2;

@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 use super::parameters::{CheckedParticleParameters, ParticleParameters, Response};
 use super::raim::{Decision, ParticleRaim};
 use crate::error::within;
-use crate::{CorrelatedNoise, MonitorError, STATES, Sight};
+use crate::{CorrelatedNoise, MonitorError, Sight};
 
 /// Clean stretches simulated to find a threshold.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,69 +42,80 @@ impl Calibration {
         )
     }
 
-    /// The threshold that this share of clean stretches exceeds, at most, with the design rows
-    /// `designs`, pseudoranges that the monitor takes for `sigma_m`, and noise as `noise`.
-    ///
-    /// A chi-square or a normal tail cannot be asked: the largest of many overlapping sums of
-    /// correlated ratios has no law of its own. Simulation asks the very code that will decide.
+    /// The threshold of a bank of particle filters that this share of clean stretches exceeds, at most;
+    /// `sights` and `noise` as for [`Self::threshold_of`].
     ///
     /// # Errors
     /// [`MonitorError::Value`] where something is not possible, or with fewer than five satellites.
     pub fn threshold(
         &self,
         parameters: &CheckedParticleParameters,
-        designs: &[[f64; STATES]],
-        sigma_m: f64,
+        sights: &[Sight],
         noise: &CorrelatedNoise,
         random: &mut ChaCha8Rng,
     ) -> Result<f64, MonitorError> {
-        self.check()?;
-        noise.check()?;
-        within("satellites", designs.len() as f64, (5.0, 1e3), "5 or more")?;
         let observing = ParticleParameters {
             response: Response::Observe,
             ..*parameters.get()
         };
         let observing = observing.check()?;
+        let start = |random| ParticleRaim::new(observing, random);
+        let score = |raim: &mut ParticleRaim, k: usize, sights: &[Sight]| {
+            let epoch = raim.epoch(k as f64, sights)?;
+            Ok(match epoch.decision {
+                Decision::Judged { score, .. } => score,
+                Decision::WarmingUp | Decision::Unavailable => f64::NEG_INFINITY,
+            })
+        };
+        let warm_up = parameters.get().warm_up_epochs;
+        self.threshold_of((sights, noise, warm_up), random, start, score)
+    }
+
+    /// The threshold that the scores of any detector exceed in this share of clean stretches, at most.
+    ///
+    /// The satellites are those of `sights`, whose residuals do not matter. `noise` is that of a
+    /// satellite whose stated deviation is 1 m, and every satellite's is its own stated deviation times as
+    /// large; scores of the first `warm_up` epochs do not count. `start` makes a detector that has
+    /// seen nothing of a source of chance, `score` gives it an epoch.
+    ///
+    /// A chi-square or a normal tail cannot be asked: the largest of many overlapping sums of
+    /// correlated ratios has no law of its own. Simulation asks the very code that will decide.
+    ///
+    /// # Errors
+    /// [`MonitorError::Value`] where something is not possible, or with fewer than five satellites;
+    /// those of `score`.
+    pub fn threshold_of<D>(
+        &self,
+        (sights, noise, warm_up): (&[Sight], &CorrelatedNoise, usize),
+        random: &mut ChaCha8Rng,
+        start: impl Fn(ChaCha8Rng) -> D,
+        mut score: impl FnMut(&mut D, usize, &[Sight]) -> Result<f64, MonitorError>,
+    ) -> Result<f64, MonitorError> {
+        self.check()?;
+        noise.check()?;
+        within("satellites", sights.len() as f64, (5.0, 1e3), "5 or more")?;
         let mut largest = Vec::with_capacity(self.runs);
         for _ in 0..self.runs {
-            let own = ChaCha8Rng::from_seed(random.random());
-            largest.push(self.clean_largest(observing, designs, sigma_m, noise, own)?);
+            let mut own = ChaCha8Rng::from_seed(random.random());
+            let mut generator = noise.generator(sights.len(), &mut own);
+            let mut values = vec![0.0; sights.len()];
+            let mut detector = start(ChaCha8Rng::from_seed(own.random()));
+            let mut noisy = sights.to_vec();
+            let mut highest = f64::NEG_INFINITY;
+            for k in 0..warm_up + self.epochs {
+                generator.advance(1.0, &mut values, &mut own);
+                for (sight, value) in noisy.iter_mut().zip(&values) {
+                    sight.residual_m = sight.sigma_m * value;
+                }
+                let score = score(&mut detector, k, &noisy)?;
+                if k >= warm_up {
+                    highest = highest.max(score);
+                }
+            }
+            largest.push(highest);
         }
         largest.sort_by(f64::total_cmp);
         let exceeding = (self.false_alarm_share * self.runs as f64) as usize;
         Ok(largest[self.runs - 1 - exceeding])
-    }
-
-    /// Largest decision of one clean stretch.
-    fn clean_largest(
-        &self,
-        parameters: CheckedParticleParameters,
-        designs: &[[f64; STATES]],
-        sigma_m: f64,
-        noise: &CorrelatedNoise,
-        mut random: ChaCha8Rng,
-    ) -> Result<f64, MonitorError> {
-        let mut generator = noise.generator(designs.len(), &mut random);
-        let mut values_m = vec![0.0; designs.len()];
-        let raim_random = ChaCha8Rng::from_seed(random.random());
-        let mut raim = ParticleRaim::new(parameters, raim_random);
-        let mut largest = f64::NEG_INFINITY;
-        for k in 0..parameters.get().warm_up_epochs + self.epochs {
-            generator.advance(1.0, &mut values_m, &mut random);
-            let rows = (0..).zip(designs.iter().zip(&values_m));
-            let sights: Vec<_> = rows
-                .map(|(id, (design, residual_m))| Sight {
-                    id,
-                    design: *design,
-                    residual_m: *residual_m,
-                    sigma_m,
-                })
-                .collect();
-            if let Decision::Judged { score, .. } = raim.epoch(k as f64, &sights)?.decision {
-                largest = largest.max(score);
-            }
-        }
-        Ok(largest)
     }
 }

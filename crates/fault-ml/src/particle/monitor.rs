@@ -5,14 +5,12 @@ use rand_chacha::ChaCha8Rng;
 use super::parameters::{CheckedParticleParameters, Movement};
 use super::protection::{IntegrityRisk, ProtectionLevels};
 use super::raim::{Decision, ParticleRaim, RaimEpoch};
+use crate::error::check_later;
 use crate::linearise::{Reference, check_measurements};
 use crate::{
     IntegrityMonitor, IntegrityReport, Judgement, MonitorError, STATES, SatelliteMeasurement, Sight,
 };
 
-/// Farthest the estimate may be from the reference point before that follows, m: the linear model
-/// still holds to 0.1 mm there.
-const FARTHEST_M: f64 = 50.0;
 /// Fewest satellites the first position is taken from: one more than needed.
 const FEWEST_TO_START: usize = STATES + 1;
 
@@ -21,7 +19,7 @@ const FEWEST_TO_START: usize = STATES + 1;
 /// The first epoch with five satellites gives the reference by least squares. The clock of the
 /// reference follows the receiver's: every epoch the median residual, which one fault moves
 /// little, is taken off, so that any drift or jump common to all satellites is gone before a particle
-/// meets it. The process noise of the clock has to cover the error of that median, about
+/// meets it. A receiver that moves says by how much ([`Self::displace`]); particles are errors of that. The process noise of the clock has to cover the error of that median, about
 /// 0.5 sigma for eight satellites ([`ParticleParameters::receiver`](super::ParticleParameters)).
 #[derive(Debug, Clone)]
 pub struct ParticleMonitor {
@@ -31,7 +29,6 @@ pub struct ParticleMonitor {
     last_time_s: Option<f64>,
     last: Option<RaimEpoch>,
     sights: Vec<Sight>,
-    sorted_m: Vec<f64>,
     set_aside: Vec<u32>,
 }
 
@@ -46,7 +43,6 @@ impl ParticleMonitor {
             last_time_s: None,
             last: None,
             sights: Vec::new(),
-            sorted_m: Vec::new(),
             set_aside: Vec::new(),
         }
     }
@@ -85,16 +81,11 @@ impl ParticleMonitor {
         raim.protection_levels(&reference.position_ecef_m.map(|p| p / norm), risk)
     }
 
-    fn check_time(&self, time_s: f64) -> Result<(), MonitorError> {
-        let grown = self.last_time_s.is_none_or(|last| time_s > last);
-        if time_s.is_finite() && grown {
-            return Ok(());
+    /// The receiver has moved by `offset_ecef_m` (ECEF, m) since the last epoch.
+    pub fn displace(&mut self, offset_ecef_m: &[f64; 3]) {
+        if let Some((_, reference)) = &mut self.running {
+            reference.displace(offset_ecef_m);
         }
-        Err(MonitorError::Value {
-            name: "time (s)",
-            value: time_s,
-            expected: "a number above that of the epoch before",
-        })
     }
 
     /// The bank, started where this epoch allows it.
@@ -106,39 +97,14 @@ impl ParticleMonitor {
         }
     }
 
-    /// Takes the clock of this epoch into the reference: the median of what the satellites in use
-    /// leave unexplained by the last estimate.
+    /// Takes the clock of this epoch into the reference.
     fn follow_clock(&mut self, measurements: &[SatelliteMeasurement]) {
-        let Some((_, reference)) = &mut self.running else {
-            return;
-        };
-        let at = self
-            .last
-            .as_ref()
-            .map_or([0.0; STATES], |last| last.estimate_m);
-        self.sorted_m.clear();
-        let used = measurements
-            .iter()
-            .filter(|m| !self.set_aside.contains(&m.id));
-        self.sorted_m
-            .extend(used.map(|m| reference.sight(m).residual_about(&at)));
-        self.sorted_m.sort_by(f64::total_cmp);
-        let middle = self.sorted_m.len() / 2;
-        if let Some(upper) = self.sorted_m.get(middle) {
-            let lower = self.sorted_m[self.sorted_m.len() - 1 - middle];
-            reference.clock_m += 0.5 * (lower + upper);
+        let at = self.last.map_or([0.0; STATES], |last| last.estimate_m);
+        let aside = &self.set_aside;
+        let used = measurements.iter().filter(|m| !aside.contains(&m.id));
+        if let Some((_, reference)) = &mut self.running {
+            reference.follow_clock(used, &at);
         }
-    }
-}
-
-/// Moves the reference to the estimate once that is far away.
-fn follow_position(raim: &mut ParticleRaim, reference: &mut Reference, last: &mut RaimEpoch) {
-    let [x, y, z, clock_m] = last.estimate_m;
-    if (x * x + y * y + z * z).sqrt() > FARTHEST_M {
-        let moved = [x, y, z, 0.0];
-        *reference = reference.moved(&moved);
-        raim.shift(&moved.map(|m| -m));
-        last.estimate_m = [0.0, 0.0, 0.0, clock_m];
     }
 }
 
@@ -156,7 +122,7 @@ impl IntegrityMonitor for ParticleMonitor {
         measurements: &[SatelliteMeasurement],
     ) -> Result<IntegrityReport, MonitorError> {
         check_measurements(measurements)?;
-        self.check_time(time_s)?;
+        check_later(time_s, self.last_time_s)?;
         self.start(measurements);
         self.follow_clock(measurements);
         self.last_time_s = Some(time_s);
@@ -168,8 +134,11 @@ impl IntegrityMonitor for ParticleMonitor {
             .extend(measurements.iter().map(|m| reference.sight(m)));
         let mut epoch = raim.epoch(time_s, &self.sights)?;
         self.set_aside.clear();
-        self.set_aside.extend(raim.set_aside());
-        follow_position(raim, reference, &mut epoch);
+        self.set_aside.extend_from_slice(raim.set_aside());
+        if let Some(shift_m) = reference.follow_position(&epoch.estimate_m) {
+            raim.shift(&shift_m);
+            epoch.estimate_m = std::array::from_fn(|d| epoch.estimate_m[d] + shift_m[d]);
+        }
         self.last = Some(epoch);
         let threshold = self.parameters.get().threshold;
         Ok(match epoch.decision {

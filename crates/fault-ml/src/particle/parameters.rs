@@ -1,7 +1,7 @@
 //! What can be set of the particle filters and their decision, with defaults and reasons.
 
 use crate::particle::Likelihood;
-use crate::particle::swarm::SwarmSettings;
+use crate::particle::swarm::{SwarmOrder, SwarmSettings};
 use crate::{MonitorError, STATES, Sight, error::within};
 
 /// What moves the predicted particles towards the measurement.
@@ -59,7 +59,7 @@ pub struct ParticleParameters {
     pub clock_noise_m: f64,
     /// Deviation the filters believe over the one a sight states, 0.1 to 100. Default 1. What
     /// stays with a satellite for longer than the window is no news in every epoch, though the
-    /// ratios count it so: noise with biases needs about 1.5.
+    /// ratios count it so: noise with biases of just the stated deviation needs about 1.5.
     pub deviation_factor: f64,
     /// Believed shape of the measurement noise. Default Gaussian (Wang2016 (5)).
     pub likelihood: Likelihood,
@@ -121,24 +121,33 @@ impl ParticleParameters {
     }
 
     /// For a receiver at rest by [`ParticleMonitor`](crate::particle::ParticleMonitor): 200
-    /// particles, normal noise of 1.5 times the stated deviation, and a clock that is integrated
-    /// out, or sampled under a swarm.
+    /// particles, normal noise of the stated deviation, and a clock that is integrated out, or
+    /// sampled under a swarm.
     ///
     /// The clock noise has to cover the error of the median residual that the monitor steers its
     /// reference by, half a deviation of a pseudorange: 10 m where the clock is integrated out and
     /// a wide prior costs nothing, 1.5 m where particles have to find it. The noise of receivers
     /// in the open is slow rather than heavy-tailed: with satellite biases of 2 m, a mixture
-    /// likelihood first takes a step of 15 m for a tail.
+    /// likelihood first takes a step of 15 m for a tail. Deviations from the accuracy that
+    /// satellites broadcast leave room for biases by themselves; deviations that are just true
+    /// need a [`deviation_factor`](Self::deviation_factor). A swarm is corrected for: moved and
+    /// not corrected, the main filter follows a faulty satellite at once, and less speaks against
+    /// it.
     #[must_use]
     pub fn receiver(movement: Movement) -> Self {
-        let (clock, clock_noise_m) = match movement {
-            Movement::Bootstrap => (ClockState::Marginalised, 10.0),
-            Movement::Swarm(_) => (ClockState::Sampled, 1.5),
+        let (movement, clock, clock_noise_m) = match movement {
+            Movement::Bootstrap => (movement, ClockState::Marginalised, 10.0),
+            Movement::Swarm(swarm) => {
+                let corrected = SwarmSettings {
+                    order: SwarmOrder::Corrected,
+                    ..swarm
+                };
+                (Movement::Swarm(corrected), ClockState::Sampled, 1.5)
+            }
         };
         Self {
             particles: 200,
             clock_noise_m,
-            deviation_factor: 1.5,
             movement,
             clock,
             ..Self::default()

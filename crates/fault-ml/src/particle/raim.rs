@@ -4,6 +4,8 @@ use rand_chacha::ChaCha8Rng;
 
 use super::filter::{Epoch, Filter, Outcome};
 use super::parameters::{CheckedParticleParameters, RatioForm, Response};
+use crate::error::check_later;
+use crate::readmission::Readmission;
 use crate::window::CumulativeRatio;
 use crate::{MonitorError, STATES, Sight, check_sights};
 
@@ -74,14 +76,6 @@ impl Subfilter {
     }
 }
 
-/// A satellite not in use, and the evidence that it has recovered.
-#[derive(Debug, Clone, Copy)]
-struct SetAside {
-    id: u32,
-    /// Cumulative ln p(y | healthy) - ln p(y | fault), held at zero from below.
-    recovery: f64,
-}
-
 /// Particle-filter integrity monitoring over line-of-sight snapshots, Wang2016.
 ///
 /// A main filter takes all satellites in use, sub filter q all but satellite q. The one that
@@ -100,7 +94,7 @@ pub struct ParticleRaim {
     main: Filter,
     subfilters: Vec<Subfilter>,
     in_use: Vec<Sight>,
-    set_aside: Vec<SetAside>,
+    aside: Readmission,
     log_without: Vec<f64>,
     last_time_s: Option<f64>,
     epochs: usize,
@@ -117,7 +111,7 @@ impl ParticleRaim {
             main,
             subfilters: Vec::new(),
             in_use: Vec::new(),
-            set_aside: Vec::new(),
+            aside: Readmission::default(),
             log_without: Vec::new(),
             last_time_s: None,
             epochs: 0,
@@ -131,8 +125,9 @@ impl ParticleRaim {
     }
 
     /// Satellites alarmed on and not yet taken back.
-    pub fn set_aside(&self) -> impl Iterator<Item = u32> {
-        self.set_aside.iter().map(|s| s.id)
+    #[must_use]
+    pub fn set_aside(&self) -> &[u32] {
+        self.aside.ids()
     }
 
     /// Cumulative ratio of every satellite in use, maximised over window starts; minus infinity
@@ -181,11 +176,11 @@ impl ParticleRaim {
     /// then leaves no trace.
     pub fn epoch(&mut self, time_s: f64, sights: &[Sight]) -> Result<RaimEpoch, MonitorError> {
         check_sights(sights)?;
-        let elapsed_s = self.elapsed_s(time_s)?;
+        let elapsed_s = check_later(time_s, self.last_time_s)?.unwrap_or(FIRST_ELAPSED_S);
         self.last_time_s = Some(time_s);
         self.in_use.clear();
-        let aside = &self.set_aside;
-        let used = |s: &&Sight| !aside.iter().any(|a| a.id == s.id);
+        let aside = self.aside.ids();
+        let used = |s: &&Sight| !aside.contains(&s.id);
         let parameters = &self.parameters;
         self.in_use
             .extend(sights.iter().filter(used).map(|s| parameters.believed(s)));
@@ -209,20 +204,6 @@ impl ParticleRaim {
             report.estimate_m = clean.outcome.estimate_m;
         }
         Ok(report)
-    }
-
-    fn elapsed_s(&self, time_s: f64) -> Result<f64, MonitorError> {
-        let elapsed_s = self
-            .last_time_s
-            .map_or(FIRST_ELAPSED_S, |last| time_s - last);
-        if time_s.is_finite() && elapsed_s > 0.0 {
-            return Ok(elapsed_s);
-        }
-        Err(MonitorError::Value {
-            name: "time (s)",
-            value: time_s,
-            expected: "a number above that of the epoch before",
-        })
     }
 
     /// Puts the sub filters in the order of the sights. A satellite new in use gets a copy of the
@@ -312,7 +293,7 @@ impl ParticleRaim {
         for sub in &mut self.subfilters {
             sub.restart(&self.main);
         }
-        self.set_aside.push(SetAside { id, recovery: 0.0 });
+        self.aside.insert(id);
         Some(clean)
     }
 
@@ -320,16 +301,13 @@ impl ParticleRaim {
     /// the odds of health over a uniform fault exceed the threshold.
     fn readmit(&mut self, sights: &[Sight]) -> Option<u32> {
         let settings = self.parameters.get();
-        let (log_width, threshold) = (settings.fault_width_m.ln(), settings.threshold);
-        for aside in &mut self.set_aside {
-            let Some(sight) = sights.iter().find(|s| s.id == aside.id) else {
-                continue;
-            };
-            let sight = self.parameters.believed(sight);
-            let healthy = self.main.log_expectation(&sight, &self.parameters);
-            aside.recovery = (aside.recovery + healthy + log_width).max(0.0);
+        for sight in sights {
+            if self.aside.ids().contains(&sight.id) {
+                let sight = self.parameters.believed(sight);
+                let healthy = self.main.log_expectation(&sight, &self.parameters);
+                self.aside.weigh(sight.id, healthy, settings.fault_width_m);
+            }
         }
-        let at = self.set_aside.iter().position(|a| a.recovery > threshold)?;
-        Some(self.set_aside.remove(at).id)
+        self.aside.take_back(settings.threshold)
     }
 }

@@ -116,7 +116,7 @@ fn faults_are_set_aside_one_after_another_and_taken_back_when_gone() {
     };
     assert!(first <= 102 && second <= 161, "{events:?}");
     assert!((255..275).contains(&back), "{events:?}");
-    assert_eq!(raim.set_aside().collect::<Vec<_>>(), [3]);
+    assert_eq!(raim.set_aside(), [3]);
 }
 
 #[test]
@@ -231,17 +231,16 @@ fn protection_levels_hold_the_error_with_and_without_an_unnoticed_fault() {
 fn a_calibrated_threshold_has_the_stated_false_alarm_rate_under_correlated_noise() {
     let correlated = crate::CorrelatedNoise {
         bias_sigma_m: 0.0,
+        bias_tail_share: 0.0,
         markov_sigma_m: 1.5,
         markov_time_s: 60.0,
         white_sigma_m: 1.0,
         tail_share: 0.1,
     };
-    let (parameters, designs, sigma_m) = (
-        ParticleParameters::default(),
-        designs(),
-        correlated.sigma_m(),
-    );
-    let parameters = parameters.check().unwrap();
+    let parameters = ParticleParameters::default().check().unwrap();
+    let sights = sights(&designs(), |_| 0.0);
+    // The sights state 3 m, and that is what it is.
+    let noise = correlated.scaled(1.0 / correlated.sigma_m());
     let calibration = Calibration {
         runs: 60,
         epochs: 100,
@@ -254,7 +253,7 @@ fn a_calibrated_threshold_has_the_stated_false_alarm_rate_under_correlated_noise
             ..calibration
         };
         calibration
-            .threshold(&parameters, &designs, sigma_m, &correlated, &mut random)
+            .threshold(&parameters, &sights, &noise, &mut random)
             .unwrap()
     };
     let stated = threshold(0.2, 1);

@@ -40,41 +40,39 @@ pub(super) fn without_faults(
         return Ok(Cleared::of(all));
     }
     for faults in 1..=settings.most_faults.min(MOST_FAULTS) {
-        let Some(suspects) = most_suspect(&all, faults, settings)? else {
-            continue;
-        };
-        let rest: Vec<Measurement> = measurements
-            .iter()
-            .filter(|m| !suspects.satellites.contains(&m.satellite))
-            .copied()
-            .collect();
-        let Ok(mut solution) = least_squares::solve(&rest, model, &all.position_ecef_m) else {
-            continue;
-        };
-        // The position has moved: what stood above the mask may stand below it now, and the
-        // residuals are tested as they are, not as the linear model foresaw.
-        solution.consistency = test(&solution, settings)?.0;
-        if solution.consistency != Consistency::Passed
-            || solution.degrees_of_freedom() < redundancy_needed(faults)
-        {
-            continue;
-        }
-        let misfits = measurements
-            .iter()
-            .filter(|m| suspects.satellites.contains(&m.satellite))
-            .map(|m| Misfit {
+        for suspects in most_suspect(&all, faults, settings)? {
+            let rest: Vec<Measurement> = measurements
+                .iter()
+                .filter(|m| !suspects.satellites.contains(&m.satellite))
+                .copied()
+                .collect();
+            let Ok(mut solution) = least_squares::solve(&rest, model, &all.position_ecef_m) else {
+                continue;
+            };
+            // The position has moved: what stood above the mask may stand below it now, and the
+            // residuals are tested as they are, not as the linear model foresaw.
+            solution.consistency = test(&solution, settings)?.0;
+            if solution.consistency != Consistency::Passed
+                || solution.degrees_of_freedom() < redundancy_needed(faults)
+            {
+                continue;
+            }
+            let named = measurements
+                .iter()
+                .filter(|m| suspects.satellites.contains(&m.satellite));
+            let misfits = named.map(|m| Misfit {
                 satellite: m.satellite,
                 residual_m: residual(m, model, &solution).map_or(f64::NAN, |r| r.0),
                 score: all.chi_square,
                 threshold,
                 place: Place::InUse,
-            })
-            .collect();
-        return Ok(Cleared {
-            solution,
-            misfits,
-            is_unique: suspects.is_unique,
-        });
+            });
+            return Ok(Cleared {
+                misfits: misfits.collect(),
+                solution,
+                is_unique: suspects.is_unique,
+            });
+        }
     }
     Ok(Cleared::of(all))
 }
@@ -91,41 +89,37 @@ struct Suspects {
     is_unique: bool,
 }
 
-/// The `faults` satellites without which the chi-square is least and passes.
+/// Sets of `faults` satellites, the one first without which the chi-square is least.
+///
+/// The linear model errs by the square of the displacement over the range, 1 km for a fault of 150 km:
+/// whether a set will do is for the test after a new solution to say. All single satellites are given,
+/// as beyond that the order says little; of larger sets the first alone.
 fn most_suspect(
     solution: &Solution,
     faults: usize,
     settings: &IntegritySettings,
-) -> Result<Option<Suspects>, NavError> {
+) -> Result<Vec<Suspects>, NavError> {
     let Some(parity) = Parity::of(solution) else {
-        return Ok(None);
+        return Ok(Vec::new());
     };
     let left = parity.freedom().saturating_sub(faults);
     if left < redundancy_needed(faults) {
-        return Ok(None);
+        return Ok(Vec::new());
     }
     let threshold = chi_square_threshold(left, settings.false_alarm_probability)?;
-    let mut best: Option<(f64, Vec<usize>)> = None;
-    let mut passing = 0;
+    let mut sets: Vec<(f64, Vec<usize>)> = Vec::new();
     for_each_set(parity.satellites(), faults, &mut |set| {
-        let Some(rest) = parity.without(set) else {
-            return;
-        };
-        passing += usize::from(rest <= threshold);
-        if best.as_ref().is_none_or(|(least, _)| rest < *least) {
-            best = Some((rest, set.to_vec()));
-        }
+        sets.extend(parity.without(set).map(|rest| (rest, set.to_vec())));
     });
-    // The linear model errs by the square of the displacement over the range: twice the threshold
-    // leaves room for it, the test after the new solution decides.
-    let found = best.filter(|(rest, _)| *rest <= 2.0 * threshold);
-    Ok(found.map(|(_, set)| {
-        let satellites = set.iter().filter_map(|i| solution.satellites.get(*i));
-        Suspects {
-            satellites: satellites.map(|s| s.satellite).collect(),
-            is_unique: passing <= 1,
-        }
-    }))
+    sets.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let is_unique = sets.iter().filter(|(rest, _)| *rest <= threshold).count() <= 1;
+    let tried = if faults == 1 { sets.len() } else { 1 };
+    let name = |i: &usize| solution.satellites.get(*i).map(|s| s.satellite);
+    let suspects = sets.iter().take(tried).map(|(_, set)| Suspects {
+        satellites: set.iter().filter_map(name).collect(),
+        is_unique,
+    });
+    Ok(suspects.collect())
 }
 
 /// Calls `visit` with every set of `size` of the numbers below `count`, in lexical order.

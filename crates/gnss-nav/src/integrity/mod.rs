@@ -21,7 +21,7 @@ use crate::measurement::{Measurement, MeasurementModel};
 use crate::{NavError, SatelliteId, least_squares};
 
 pub use parity::Parity;
-pub use protection::ProtectionLevels;
+pub use protection::{ProtectionLevels, Ranged, levels_of};
 
 /// What is tested, and how sharply.
 #[derive(Debug, Clone, Copy, PartialEq)]

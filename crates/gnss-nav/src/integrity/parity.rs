@@ -3,6 +3,7 @@
 use faer::Mat;
 use nalgebra::{DMatrix, DVector};
 
+use crate::geodesy::Look;
 use crate::least_squares::Solution;
 
 /// Unknowns of a position.
@@ -30,7 +31,8 @@ impl Parity {
         let satellites = &solution.satellites;
         let freedom = satellites.len().checked_sub(UNKNOWNS).filter(|f| *f > 0)?;
         let geometry = Mat::from_fn(satellites.len(), UNKNOWNS, |i, j| {
-            row(&satellites[i])[j] / satellites[i].pseudorange_sigma_m
+            let satellite = &satellites[i];
+            row(&satellite.look())[j] / satellite.pseudorange_sigma_m
         });
         let q = geometry.qr().compute_Q();
         let basis = DMatrix::from_fn(satellites.len(), freedom, |i, j| q[(i, UNKNOWNS + j)]);
@@ -91,9 +93,9 @@ impl Parity {
 }
 
 /// Derivatives of a pseudorange by east, north, up and clock.
-pub(super) fn row(satellite: &crate::least_squares::UsedSatellite) -> [f64; UNKNOWNS] {
-    let (sin_azimuth, cos_azimuth) = satellite.azimuth_rad.sin_cos();
-    let (sin_elevation, cos_elevation) = satellite.elevation_rad.sin_cos();
+pub(super) fn row(look: &Look) -> [f64; UNKNOWNS] {
+    let (sin_azimuth, cos_azimuth) = look.azimuth_rad.sin_cos();
+    let (sin_elevation, cos_elevation) = look.elevation_rad.sin_cos();
     [
         -sin_azimuth * cos_elevation,
         -cos_azimuth * cos_elevation,

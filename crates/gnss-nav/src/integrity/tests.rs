@@ -87,6 +87,26 @@ fn leaving_one_out_is_what_a_solution_without_it_gives() {
 }
 
 #[test]
+fn a_fault_of_code_periods_is_taken_out_where_six_satellites_are_left_to_tell() {
+    for fault_m in [3e3, -3e5, 6e5] {
+        for bad in 0..7 {
+            let mut measurements = epoch(7, 2);
+            measurements[bad].pseudorange_m += fault_m;
+            let assured = solved(&measurements);
+            let name = measurements[bad].satellite;
+            assert_eq!(assured.solution.excluded, [name], "{fault_m} m");
+            assert_eq!(assured.solution.consistency, Consistency::Passed);
+        }
+    }
+    let mut five = epoch(5, 2);
+    five[2].pseudorange_m += 3e3;
+    let assured = solved(&five);
+    assert_eq!(assured.solution.consistency, Consistency::Failed);
+    assert!(assured.misfits.is_empty() && assured.solution.satellites.len() == 5);
+    assert_eq!(assured.protection, None);
+}
+
+#[test]
 fn one_and_several_faults_are_taken_out_and_named() {
     for (faults, count) in [(1, 8), (2, 9), (3, 10)] {
         let mut measurements = epoch(count, 11);

@@ -1,18 +1,17 @@
 //! Position, velocity and time of one epoch by weighted least squares.
 
 mod dops;
-mod exclusion;
 mod position;
 mod velocity;
 
 use nalgebra::{Matrix4, Vector3};
 
 use crate::constants::SPEED_OF_LIGHT_MPS;
+use crate::geodesy::Look;
 use crate::measurement::{Measurement, MeasurementModel, Predicted};
 use crate::{GpsTime, NavError, SatelliteId};
 
 pub use dops::Dops;
-pub use exclusion::solve_with_exclusion;
 pub(crate) use velocity::{RateEquation, solve_velocity};
 
 /// Unknowns of the position: three coordinates and the clock.
@@ -37,7 +36,7 @@ pub struct Solution {
     pub satellites: Vec<UsedSatellite>,
     /// Satellites below the elevation mask.
     pub masked: Vec<SatelliteId>,
-    /// Satellites taken out by [`solve_with_exclusion`].
+    /// Satellites taken out by [`integrity::solve`](crate::integrity::solve).
     pub excluded: Vec<SatelliteId>,
     /// Sum of the squared pseudorange residuals over their variances.
     pub chi_square: f64,
@@ -71,6 +70,17 @@ pub struct UsedSatellite {
     pub pseudorange_sigma_m: f64,
     /// Measured minus predicted range rate, m/s; `None` where it was not used.
     pub range_rate_residual_mps: Option<f64>,
+}
+
+impl UsedSatellite {
+    /// Where it stands.
+    #[must_use]
+    pub const fn look(&self) -> Look {
+        Look {
+            azimuth_rad: self.azimuth_rad,
+            elevation_rad: self.elevation_rad,
+        }
+    }
 }
 
 /// Outcome of the residual test.
@@ -119,16 +129,7 @@ pub fn solve(
     model: &MeasurementModel,
     start_ecef_m: &Vector3<f64>,
 ) -> Result<Solution, NavError> {
-    let all: Vec<&Measurement> = measurements.iter().collect();
-    solve_subset(&all, model, start_ecef_m)
-}
-
-fn solve_subset(
-    measurements: &[&Measurement],
-    model: &MeasurementModel,
-    start_ecef_m: &Vector3<f64>,
-) -> Result<Solution, NavError> {
-    let coarse = position::coarse(measurements, start_ecef_m)?;
+    let coarse = position::coarse(&measurements.iter().collect::<Vec<_>>(), start_ecef_m)?;
     let (used, masked): (Vec<&Measurement>, Vec<&Measurement>) =
         measurements.iter().partition(|m| {
             let predicted = model.predict(&m.state, &coarse, m.receive_time);

@@ -16,7 +16,7 @@ fn vector(row: &[&str], first: usize) -> Vector3<f64> {
 }
 
 #[test]
-fn positions_are_those_of_the_simulator() {
+fn positions_and_ranges_are_those_of_the_simulator() {
     let folder = "rinex/03_spirent_4h_5min";
     let (Some(nav), Some(truth)) = (
         text(&format!("{folder}/Spirent_RINEX_GN.23N")),
@@ -30,7 +30,7 @@ fn positions_are_those_of_the_simulator() {
         5_507_219.953_754_01,
         3_170_373.735_383_64,
     );
-    let (mut worst_m, mut count) = (0.0f64, 0);
+    let (mut worst_m, mut worst_range_m, mut count) = (0.0f64, 0.0f64, 0);
     for row in rows(&truth, 5).filter(|row| row[2] == "GPS") {
         let satellite = SatelliteId::gps(number(&row, 4) as u8);
         // File time 60 s is 10:00:00 of 2023-01-08.
@@ -41,11 +41,13 @@ fn positions_are_those_of_the_simulator() {
         };
         let path = LineOfSight::new(&ephemeris.state_at(sent).unwrap(), &receiver);
         worst_m = worst_m.max((path.satellite_position_ecef_m - vector(&row, 6)).norm());
+        worst_range_m = worst_range_m.max((path.range_m - number(&row, 14)).abs());
         count += 1;
     }
-    eprintln!("{count} positions, worst {worst_m:.6} m");
+    eprintln!("{count} positions, worst {worst_m:.6} m, ranges {worst_range_m:.6} m");
     // The file has 0.1 mm steps; its simulator flies these very ephemerides.
     assert!(count > 200 && worst_m < 1e-3, "{count} {worst_m}");
+    assert!(worst_range_m < 1e-3, "{worst_range_m}");
 }
 
 #[test]

@@ -1,7 +1,8 @@
 //! Least squares on recorded pseudoranges, beside RTKLIB.
 
 use gnss_nav::constants::SPEED_OF_LIGHT_MPS;
-use gnss_nav::least_squares::{solve, solve_with_exclusion};
+use gnss_nav::integrity::{self, IntegritySettings};
+use gnss_nav::least_squares::solve;
 use gnss_nav::measurement::form;
 use gnss_nav::{Geodetic, GpsTime, MeasurementModel, RawMeasurement};
 use nalgebra::Vector3;
@@ -176,8 +177,10 @@ fn genuine_outliers_are_excluded() {
     for epoch in all.chunk_by(|a, b| a[1] == b[1]) {
         let raws: Vec<RawMeasurement> = epoch.iter().map(|row| raw(row)).collect();
         let formed = form(time(&epoch[0]), &raws, &navigation.store);
-        let solution =
-            solve_with_exclusion(&formed.measurements, &model, &Vector3::zeros(), 1e-5).unwrap();
+        let settings = IntegritySettings::default();
+        let start = Vector3::zeros();
+        let assured = integrity::solve(&formed.measurements, &model, &start, &settings).unwrap();
+        let solution = assured.solution;
         for row in epoch {
             let wrong = number(row, 11).abs() > 100.0;
             let out = solution.excluded.contains(&row[2].parse().unwrap());

@@ -63,6 +63,7 @@ impl Checks<'_> {
             filter: self.filter(given)?,
             monitors: self.monitors(given)?,
             policy: self.policy(given)?,
+            raim: self.run_raim(given)?,
             rate_hz: given.rate.unwrap_or(10.0),
             ionosphere: self.ionosphere(given.ionosphere.as_deref())?,
             troposphere: self.troposphere(given.troposphere.as_deref())?,
@@ -112,7 +113,7 @@ impl Checks<'_> {
         self.filter(given)?;
         self.monitors(given)?;
         self.policy(given)?;
-        self.choice("raim", given.raim.as_deref(), "none", &[("none", ())])?;
+        self.run_raim(given)?;
         self.choice("dump", given.dump.as_deref(), "taps", &[("taps", ())])?;
         self.threads(given.threads)?;
         given

@@ -8,6 +8,7 @@ mod check;
 #[cfg(test)]
 mod monitor_tests;
 mod options;
+mod raim;
 mod solve;
 #[cfg(test)]
 mod tests;
@@ -19,6 +20,7 @@ use gnss_nav::{Geodetic, GpsTime};
 use gnss_signal::sample::SampleDescription;
 
 use crate::pipeline::{FilterKind, Policy};
+use crate::raim::Raim;
 
 pub use options::{AcquireOptions, RunOptions};
 pub use solve::{SolveConfig, SolveOptions};
@@ -138,6 +140,8 @@ pub struct RunConfig {
     pub monitors: Vec<MonitorChoice>,
     /// What follows from a monitor's alarm.
     pub policy: Policy,
+    /// What tests the pseudoranges of an epoch while channels have their own loops.
+    pub raim: Raim,
     /// Navigation epochs per second.
     pub rate_hz: f64,
     /// Model of the ionosphere.

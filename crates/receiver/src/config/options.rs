@@ -63,7 +63,8 @@ pub struct RunOptions {
     /// Navigation epochs per second, up to 50 [default: 10]
     #[arg(long, value_name = "HZ")]
     pub rate: Option<f64>,
-    /// Receiver autonomous integrity monitoring: none [default: none]
+    /// Receiver autonomous integrity monitoring while channels have their own loops: none, ls, glr, pf
+    /// or pso-pf, as for `solve` [default: ls]
     #[arg(long, value_name = "RAIM")]
     pub raim: Option<String>,
     /// Ionosphere model: klobuchar or none [default: klobuchar]

@@ -7,8 +7,7 @@ use clap::Args;
 use super::check::{Checks, Origin};
 use super::{Ionosphere, Troposphere};
 use crate::ReceiverError;
-use crate::solve::{KinematicSettings, ParticleRaim, Raim, SolveSettings, Weights};
-use gnss_nav::integrity::IntegritySettings;
+use crate::solve::{KinematicSettings, SolveSettings, Weights};
 
 /// Options of `receiver solve`.
 #[derive(Debug, Clone, Default, PartialEq, Args)]
@@ -19,11 +18,13 @@ pub struct SolveOptions {
     /// RINEX 2 or 3 navigation files (plain or gzip)
     #[arg(long, value_name = "RINEX", num_args = 1..)]
     pub nav: Vec<PathBuf>,
-    /// Receiver autonomous integrity monitoring: none, ls (residuals and parity space), or particle
-    /// filters for a receiver at rest, pf or pso-pf (moved by a swarm) [default: ls]
+    /// Receiver autonomous integrity monitoring: none, ls (residuals and parity space), glr (the
+    /// same after a likelihood ratio over half a minute of innovations), or particle filters, pf or
+    /// pso-pf (proposed to by a swarm) [default: ls]
     #[arg(long, value_name = "RAIM")]
     pub raim: Option<String>,
-    /// With ls: probability that the test of a fault-free epoch fails, 1e-12 to 0.1 [default: 1e-5]
+    /// With ls and glr: probability that the test of a fault-free epoch fails, 1e-12 to 0.1
+    /// [default: 1e-5]
     #[arg(long, value_name = "P")]
     pub false_alarm: Option<f64>,
     /// Filter from epoch to epoch: none, or ekf (kinematic, on pseudoranges and Dopplers)
@@ -120,7 +121,7 @@ impl Checks<'_> {
                     .to_radians(),
                 cn0_mask_dbhz: given.cn0_mask.unwrap_or(defaults.cn0_mask_dbhz),
                 weights: self.weights(given)?,
-                raim: self.raim(given)?,
+                raim: self.solve_raim(given)?,
                 seed: given.seed.unwrap_or(defaults.seed),
                 kinematic: self.choice(
                     "filter",
@@ -151,24 +152,6 @@ impl Checks<'_> {
             ("both", Weights::Both),
         ];
         self.choice("weights", given.weights.as_deref(), "both", &weights)
-    }
-
-    fn raim(&self, given: &SolveOptions) -> Result<Raim, ReceiverError> {
-        self.number("false-alarm", given.false_alarm, "1e-12 to 0.1", |p| {
-            (1e-12..=0.1).contains(&p)
-        })?;
-        let default = IntegritySettings::default();
-        let settings = IntegritySettings {
-            false_alarm_probability: given.false_alarm.unwrap_or(default.false_alarm_probability),
-            ..default
-        };
-        let monitors = [
-            ("none", Raim::None),
-            ("ls", Raim::LeastSquares(settings)),
-            ("pf", Raim::Particle(ParticleRaim::Bootstrap)),
-            ("pso-pf", Raim::Particle(ParticleRaim::Swarm)),
-        ];
-        self.choice("raim", given.raim.as_deref(), "ls", &monitors)
     }
 
     fn faults(

@@ -2,15 +2,15 @@
 
 use std::collections::BTreeSet;
 
-use gnss_nav::Solution;
+use gnss_nav::integrity::Misfit;
 use gnss_signal::CorrelatorBank;
 
-use super::navigator::{EXCLUSION_FALSE_ALARM, Tracked};
+use super::navigator::Tracked;
 use super::report;
 use super::run::{Fixed, Run};
 use super::slot::Slot;
 use crate::ReceiverError;
-use crate::record::{EventKind, Record};
+use crate::record::{EventKind, PvtRecord, Record};
 
 impl<B: CorrelatorBank> Run<'_, B> {
     /// Position, velocity and time of this epoch by least squares, and all its records.
@@ -23,15 +23,20 @@ impl<B: CorrelatorBank> Run<'_, B> {
             (self.sink)(Record::Observations(observations))?;
         }
         for one in &tracked {
-            let record = report::channel(time_s, one, &navigated);
+            let mut record = report::channel(time_s, one, &navigated);
+            record.scores.extend(self.navigator.watch.score());
             (self.sink)(Record::Channel(record))?;
         }
         self.consider_vector_tracking(now, &navigated)?;
         let fix = navigated.fix.as_ref();
         if let Some((solution, source)) = fix {
-            self.report_exclusions(now, solution)?;
+            self.report_exclusions(now, &navigated.misfits)?;
             self.report_fix(now, Fixed::Now)?;
-            let pvt = report::pvt(time_s, solution, *source);
+            let pvt = PvtRecord {
+                horizontal_protection_m: navigated.protection.map(|p| p.horizontal_m),
+                vertical_protection_m: navigated.protection.map(|p| p.vertical_m),
+                ..report::pvt(time_s, solution, *source)
+            };
             (self.sink)(Record::Pvt(pvt))
         } else {
             self.report_fix(now, Fixed::Before)
@@ -57,17 +62,14 @@ impl<B: CorrelatorBank> Run<'_, B> {
         }
     }
 
-    fn report_exclusions(&mut self, now: u64, solution: &Solution) -> Result<(), ReceiverError> {
-        let excluded: BTreeSet<_> = solution.excluded.iter().copied().collect();
+    fn report_exclusions(&mut self, now: u64, misfits: &[Misfit]) -> Result<(), ReceiverError> {
+        let excluded: BTreeSet<_> = misfits.iter().map(|m| m.satellite).collect();
         let before = std::mem::replace(&mut self.excluded, excluded.clone());
-        for satellite in excluded.difference(&before) {
-            let kind = EventKind::Excluded {
-                monitor: "residuals".to_owned(),
-                score: solution.chi_square,
-                threshold: report::residual_threshold(solution, EXCLUSION_FALSE_ALARM),
-                residual_m: None,
-            };
-            self.emit(now, Some(*satellite), kind)?;
+        for misfit in misfits {
+            if !before.contains(&misfit.satellite) {
+                let kind = self.navigator.watch.exclusion(misfit);
+                self.emit(now, Some(misfit.satellite), kind)?;
+            }
         }
         for satellite in before.difference(&excluded) {
             let tracked = self.slots.iter().any(|s| s.satellite == *satellite);

@@ -3,7 +3,8 @@
 use gnss_nav::atmosphere::Klobuchar;
 use gnss_nav::coarse_time::{self, Prior, SnapshotMeasurement, SnapshotSolution};
 use gnss_nav::constants::{L1_HZ, L1_WAVELENGTH_M, SPEED_OF_LIGHT_MPS};
-use gnss_nav::least_squares::{self, Consistency, Solution};
+use gnss_nav::integrity::{Assured, Misfit, ProtectionLevels};
+use gnss_nav::least_squares::{Consistency, Solution};
 use gnss_nav::measurement::{ErrorModel, Formed, MeasurementModel, RawMeasurement, form};
 use gnss_nav::prediction::{Expected, ReceiverState, predict};
 use gnss_nav::{Ephemeris, EphemerisStore, GpsTime, NavState, SatelliteId};
@@ -13,6 +14,8 @@ use nalgebra::Vector3;
 use super::clock::{ClockTrust, ReceiverClock};
 use super::settings::Settings;
 use super::slot::{Slot, transmit_fraction_s};
+use crate::ReceiverError;
+use crate::raim::RaimWatch;
 use crate::record::Source;
 
 /// Travel time assumed before the first fix, s: the middle between zenith and horizon.
@@ -46,6 +49,10 @@ pub(super) struct Tracked<'a> {
 pub(super) struct Navigated {
     /// The solution, where there is one.
     pub(super) fix: Option<(Solution, Source)>,
+    /// Satellites that do not fit it.
+    pub(super) misfits: Vec<Misfit>,
+    /// How far off it may be, where that can be said.
+    pub(super) protection: Option<ProtectionLevels>,
     /// Receiver clock at the epoch, where it is good enough for pseudoranges.
     pub(super) receive_time: Option<GpsTime>,
     /// The measurements, where the clock is good enough.
@@ -57,6 +64,8 @@ impl Navigated {
     pub(super) const fn nothing() -> Self {
         Self {
             fix: None,
+            misfits: Vec::new(),
+            protection: None,
             receive_time: None,
             raw: Vec::new(),
         }
@@ -86,6 +95,7 @@ pub(super) struct Navigator {
     near: Option<GpsTime>,
     clock: Option<ReceiverClock>,
     place: Option<Place>,
+    pub(super) watch: RaimWatch,
 }
 
 /// Where the receiver was.
@@ -98,7 +108,9 @@ struct Place {
 }
 
 impl Navigator {
-    pub(super) fn new(settings: &Settings, sample_rate_hz: f64) -> Self {
+    /// # Errors
+    /// [`ReceiverError::Monitor`] where a monitor cannot be set up.
+    pub(super) fn new(settings: &Settings, sample_rate_hz: f64) -> Result<Self, ReceiverError> {
         let aiding = &settings.aiding;
         let clock = aiding
             .time
@@ -109,7 +121,8 @@ impl Navigator {
             clock_drift_mps: 0.0,
             solved: false,
         });
-        Self {
+        Ok(Self {
+            watch: RaimWatch::new(settings.raim, settings.seed)?,
             store: aiding.ephemerides.iter().copied().collect(),
             ionosphere: aiding.ionosphere,
             use_ionosphere: settings.ionosphere,
@@ -120,7 +133,7 @@ impl Navigator {
             near: aiding.time,
             clock,
             place,
-        }
+        })
     }
 
     /// Takes the week from a message.
@@ -265,22 +278,35 @@ impl Navigator {
         navigated
     }
 
-    /// Solution of this epoch's pseudoranges and range rates alone.
-    fn least_squares(&self, tick: u64, tracked: &[Tracked]) -> Navigated {
+    /// Solution of this epoch's pseudoranges and range rates, without what does not fit.
+    fn least_squares(&mut self, tick: u64, tracked: &[Tracked]) -> Navigated {
         let (raw, formed) = self.measurements(tick, tracked);
         let start = self
             .place
             .map_or_else(Vector3::zeros, |p| p.position_ecef_m);
-        let solved = least_squares::solve_with_exclusion(
-            &formed.measurements,
-            &self.model(),
-            &start,
-            EXCLUSION_FALSE_ALARM,
-        );
-        Navigated {
-            receive_time: self.clock.map(|c| c.at(tick)),
-            fix: solved.ok().map(|s| (s, Source::LeastSquares)),
-            raw,
+        let time_s = tick as f64 / self.sample_rate_hz;
+        let model = self.model();
+        let solved = self
+            .watch
+            .epoch(time_s, &formed.measurements, &model, &start);
+        let receive_time = self.clock.map(|c| c.at(tick));
+        match solved {
+            Ok(Assured {
+                solution,
+                misfits,
+                protection,
+            }) => Navigated {
+                fix: Some((solution, Source::LeastSquares)),
+                misfits,
+                protection,
+                receive_time,
+                raw,
+            },
+            Err(_) => Navigated {
+                receive_time,
+                raw,
+                ..Navigated::nothing()
+            },
         }
     }
 
@@ -295,6 +321,7 @@ impl Navigator {
             fix,
             receive_time: self.clock.filter(|_| exact).map(|c| c.at(tick)),
             raw,
+            ..Navigated::nothing()
         }
     }
 

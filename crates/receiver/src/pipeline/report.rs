@@ -4,7 +4,7 @@ use gnss_nav::constants::L1_WAVELENGTH_M;
 use gnss_nav::filter::{Covariance, Innovation};
 use gnss_nav::geodesy::Geodetic;
 use gnss_nav::least_squares::Solution;
-use gnss_nav::{NavState, RawMeasurement, SatelliteId, chi_square_threshold};
+use gnss_nav::{NavState, RawMeasurement, SatelliteId};
 use gnss_signal::tracking::{ChannelEpoch, Lock};
 use nalgebra::Matrix3;
 
@@ -217,9 +217,4 @@ fn residuals(satellite: SatelliteId, navigated: &Navigated) -> Residuals {
         })
     });
     (code, rate)
-}
-
-/// The limit of the residual test as events report it, in units of its own chi-square.
-pub(super) fn residual_threshold(solution: &Solution, false_alarm: f64) -> f64 {
-    chi_square_threshold(solution.degrees_of_freedom().max(1), false_alarm).unwrap_or(f64::INFINITY)
 }

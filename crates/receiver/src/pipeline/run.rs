@@ -36,7 +36,7 @@ pub fn run<B: CorrelatorBank>(
     let monitors = settings.vector.as_ref().map(VectorSettings::monitors);
     let mut run = Run {
         noise: NoiseFloor::new(unused, front_end)?,
-        navigator: Navigator::new(settings, front_end.sample_rate_hz),
+        navigator: Navigator::new(settings, front_end.sample_rate_hz)?,
         schedule: Schedule::new(front_end.sample_rate_hz),
         spectrum: SpectrumSense::default(),
         tracking: settings.tracking,

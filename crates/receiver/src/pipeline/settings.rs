@@ -1,6 +1,7 @@
 //! What a run is told: valid values, no text and no files.
 
 use gnss_nav::atmosphere::Klobuchar;
+use gnss_nav::integrity::IntegritySettings;
 use gnss_nav::measurement::ErrorModel;
 use gnss_nav::{Ephemeris, GpsTime};
 use gnss_signal::SignalId;
@@ -8,6 +9,7 @@ use gnss_signal::tracking::TrackingSettings;
 use nalgebra::Vector3;
 
 use super::vector::VectorSettings;
+use crate::raim::Raim;
 
 /// Settings of a run.
 #[derive(Debug, Clone)]
@@ -31,6 +33,10 @@ pub struct Settings {
     pub troposphere: bool,
     /// What measurements err by beyond tracking noise. Default: as real ones do.
     pub errors: ErrorModel,
+    /// What tests the pseudoranges of an epoch while every channel has its own loops.
+    pub raim: Raim,
+    /// Seed of everything random.
+    pub seed: u64,
     /// What is known from elsewhere.
     pub aiding: Aiding,
     /// End of the run, s of signal.
@@ -68,6 +74,8 @@ impl Default for Settings {
             ionosphere: true,
             troposphere: true,
             errors: ErrorModel::default(),
+            raim: Raim::LeastSquares(IntegritySettings::default()),
+            seed: 0,
             aiding: Aiding::default(),
             duration_s: None,
             dump_taps: false,

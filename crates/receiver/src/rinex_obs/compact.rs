@@ -105,7 +105,7 @@ impl Arc {
     /// Takes a field: nothing, the beginning of an arc, or a difference.
     fn take(&mut self, field: &[u8]) -> Result<(), String> {
         let wrong = |expected: &str| {
-            let found = super::lines::shown(field);
+            let found = crate::rinex_text::shown(field);
             Err(format!("difference '{found}': expected {expected}"))
         };
         let integer = |text: &[u8]| std::str::from_utf8(text).ok()?.parse::<i64>().ok();

@@ -1,9 +1,8 @@
 //! The line that begins an epoch.
 
-use gnss_nav::{Calendar, GpsTime};
+use gnss_nav::GpsTime;
 
-use super::Failure;
-use super::lines::{Lines, columns, number, shown};
+use crate::rinex_text::{Failure, Lines, Stamp, columns, number, shown};
 
 /// What follows the line of an epoch.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -27,22 +26,25 @@ pub(super) struct EpochHead {
 
 /// Columns of the fields, by version.
 struct Columns {
-    date: [(usize, usize); 5],
-    second: (usize, usize),
+    stamp: Stamp,
     flag: usize,
     count: (usize, usize),
 }
 
 const COLUMNS_2: Columns = Columns {
-    date: [(1, 3), (4, 6), (7, 9), (10, 12), (13, 15)],
-    second: (15, 26),
+    stamp: Stamp {
+        date: [(1, 3), (4, 6), (7, 9), (10, 12), (13, 15)],
+        second: (15, 26),
+    },
     flag: 28,
     count: (29, 32),
 };
 
 const COLUMNS_3: Columns = Columns {
-    date: [(2, 6), (7, 9), (10, 12), (13, 15), (16, 18)],
-    second: (18, 29),
+    stamp: Stamp {
+        date: [(2, 6), (7, 9), (10, 12), (13, 15), (16, 18)],
+        second: (18, 29),
+    },
     flag: 31,
     count: (32, 35),
 };
@@ -87,51 +89,11 @@ pub(super) fn parse(lines: &Lines, text: &[u8], version: u8) -> Result<EpochHead
 }
 
 fn time(lines: &Lines, text: &[u8], layout: &Columns) -> Result<GpsTime, Failure> {
-    let date = layout.date.map(|(from, to)| number::<i32>(text, from, to));
-    let (from, to) = layout.second;
-    let parsed = match date {
-        [Some(year), Some(month), Some(day), Some(hour), Some(minute)] => {
-            let small = |value: i32| u8::try_from(value).ok();
-            second(columns(text, from, to)).and_then(|(second, fraction_s)| {
-                let date = Calendar {
-                    year: full_year(year),
-                    month: small(month)?,
-                    day: small(day)?,
-                    hour: small(hour)?,
-                    minute: small(minute)?,
-                    second,
-                    fraction_s,
-                };
-                GpsTime::try_from(date).ok()
-            })
-        }
-        _ => None,
-    };
-    parsed.ok_or_else(|| {
-        let found = shown(columns(text, 1, to));
+    layout.stamp.read(text).ok_or_else(|| {
+        let found = shown(columns(text, 1, layout.stamp.second.1));
         Failure::at(
             lines,
             format!("an epoch at '{found}': expected year month day hour minute second"),
         )
     })
-}
-
-/// A year of two digits is one of 1980 to 2079.
-const fn full_year(year: i32) -> i32 {
-    match year {
-        80..=99 => 1900 + year,
-        0..=79 => 2000 + year,
-        _ => year,
-    }
-}
-
-/// Whole seconds and fraction, apart, so that nothing is rounded.
-fn second(text: &[u8]) -> Option<(u8, f64)> {
-    let text = std::str::from_utf8(text).ok()?;
-    let (whole, fraction) = text.split_once('.').unwrap_or((text, "0"));
-    if fraction.is_empty() || !fraction.bytes().all(|b| b.is_ascii_digit()) {
-        return None;
-    }
-    let fraction_s: f64 = format!("0.{fraction}").parse().ok()?;
-    Some((whole.trim().parse().ok()?, fraction_s))
 }

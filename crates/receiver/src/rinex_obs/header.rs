@@ -2,8 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::Failure;
-use super::lines::{Lines, columns, number, shown};
+use crate::rinex_text::{Failure, Lines, columns, label, number, shown, version};
 
 /// What a header says of GPS L1 C/A.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -89,38 +88,15 @@ fn next(lines: &mut Lines) -> Result<(), Failure> {
 }
 
 fn first_line(lines: &Lines, header: &mut ObservationHeader) -> Result<(), Failure> {
-    let line = lines.current();
-    if label(line) != b"RINEX VERSION / TYPE" {
-        return Err(Failure::at(
-            lines,
-            "no RINEX file: expected 'RINEX VERSION / TYPE' in columns 61 to 80".to_owned(),
-        ));
-    }
-    let version: f64 = number(line, 0, 9).unwrap_or(f64::NAN);
-    header.version = match version {
-        v if (2.0..3.0).contains(&v) => 2,
-        v if (3.0..4.0).contains(&v) => 3,
-        _ => {
-            let found = shown(columns(line, 0, 9));
-            return Err(Failure::at(
-                lines,
-                format!("RINEX version '{found}': expected 2 or 3"),
-            ));
-        }
-    };
-    if columns(line, 20, 21) != b"O" {
-        let found = shown(columns(line, 20, 40));
+    header.version = version(lines)?;
+    if columns(lines.current(), 20, 21) != b"O" {
+        let found = shown(columns(lines.current(), 20, 40));
         return Err(Failure::at(
             lines,
             format!("a RINEX file of '{found}': expected observation data"),
         ));
     }
     Ok(())
-}
-
-/// The label of a header line.
-fn label(line: &[u8]) -> &[u8] {
-    columns(line, 60, 80)
 }
 
 /// Reads lines of a header, also of one that stands between epochs.

@@ -8,21 +8,20 @@
 mod compact;
 mod epoch;
 mod header;
-mod lines;
 mod plain;
 #[cfg(test)]
 mod tests;
 
-use std::io::{self, BufRead};
+use std::io::BufRead;
 use std::path::{Path, PathBuf};
 
 use gnss_nav::{GpsTime, SatelliteId};
 
 use crate::ReceiverError;
+use crate::rinex_text::{Failure, Lines, number, shown};
 use compact::{Compact, Field};
 use epoch::{EpochHead, Kind, list_column};
 use header::{Reading, WANTED};
-use lines::{Lines, number, shown};
 
 pub use header::ObservationHeader;
 
@@ -54,27 +53,6 @@ pub struct ObservedEpoch {
     pub satellites: Vec<ObservedSatellite>,
     /// Satellites of any system that the epoch announces and does not hold.
     pub missing: usize,
-}
-
-/// Why a file cannot be read on.
-#[derive(Debug)]
-pub(super) enum Failure {
-    /// The system said so.
-    Io(io::Error),
-    /// It is not what it should be.
-    Content(String),
-}
-
-impl Failure {
-    fn at(lines: &Lines, what: String) -> Self {
-        Self::Content(format!("line {}: {what}", lines.number()))
-    }
-}
-
-impl From<io::Error> for Failure {
-    fn from(error: io::Error) -> Self {
-        Self::Io(error)
-    }
 }
 
 /// Reads an observation file epoch by epoch; after an error it is at its end.
@@ -109,7 +87,7 @@ impl ObservationReader {
     }
 
     fn start(path: &Path, mut lines: Lines) -> Result<Self, ReceiverError> {
-        let header = header::read(&mut lines).map_err(|failure| named(path, failure))?;
+        let header = header::read(&mut lines).map_err(|failure| failure.of(path))?;
         Ok(Self {
             path: path.to_owned(),
             lines,
@@ -270,9 +248,7 @@ impl Iterator for ObservationReader {
         if self.ended {
             return None;
         }
-        let epoch = self
-            .next_epoch()
-            .map_err(|failure| named(&self.path, failure));
+        let epoch = self.next_epoch().map_err(|failure| failure.of(&self.path));
         self.ended = !matches!(epoch, Ok(Some(_)));
         epoch.transpose()
     }
@@ -295,17 +271,4 @@ fn observed(
         doppler_hz: doppler.map(|d| d.0),
         cn0_dbhz: strength.map(|s| s.0),
     })
-}
-
-fn named(path: &Path, failure: Failure) -> ReceiverError {
-    match failure {
-        Failure::Io(source) => ReceiverError::File {
-            path: path.to_owned(),
-            source,
-        },
-        Failure::Content(what) => ReceiverError::Content {
-            path: path.to_owned(),
-            what,
-        },
-    }
 }

@@ -2,8 +2,8 @@
 
 use super::epoch::list_column;
 use super::header::WANTED;
-use super::lines::{columns, number, shown};
-use super::{Failure, ObservationReader, ObservedSatellite, observed};
+use super::{ObservationReader, ObservedSatellite, observed};
+use crate::rinex_text::{Failure, columns, number, shown};
 
 /// Place of the signal strength among the wanted observables.
 const STRENGTH: usize = 3;

@@ -13,7 +13,9 @@ use gnss_nav::filter::{
     Covariance, EpochGeometry, FilterSettings, Gate, Innovation, Innovations, NavFilter,
     SequentialFilter,
 };
-use gnss_nav::{GpsTime, Measurement, MeasurementModel, NavError, NavState, SatelliteId};
+use gnss_nav::integrity::{self, IntegritySettings, ProtectionLevels, Ranged};
+use gnss_nav::{Geodetic, GpsTime, Measurement, MeasurementModel, NavError, NavState, SatelliteId};
+use nalgebra::Matrix3;
 
 use super::single_point::Fix;
 
@@ -61,6 +63,8 @@ pub(super) struct Estimate {
     pub(super) satellites: usize,
     /// Whether enough satellites determine it.
     pub(super) is_determined: bool,
+    /// How far off it may be, where enough satellites check one another.
+    pub(super) protection: Option<ProtectionLevels>,
 }
 
 /// Satellites that determine a position.
@@ -77,6 +81,8 @@ const CLOCK_STEP_M: f64 = SPEED_OF_LIGHT_MPS * 1e-3;
 struct Excess {
     code: f64,
     rate: f64,
+    /// Deviation of a single pseudorange that it comes to, m.
+    sigma_m: f64,
     seen: GpsTime,
 }
 
@@ -202,14 +208,43 @@ impl Kinematic {
         self.geometry = geometry.or(self.geometry);
         let own = filter.covariance();
         self.filter = Some(filter);
+        let covariance = self.geometry.map_or(own, |g| g.with_lasting(&own));
         Some(Estimate {
             state,
-            covariance: self.geometry.map_or(own, |g| g.with_lasting(&own)),
+            covariance,
+            protection: geometry
+                .and_then(|_| self.protection(&state, &innovations, &above, &covariance)),
             pdop: geometry.map_or(f64::INFINITY, |g| g.pdop),
             satellites: above.len(),
             is_determined: geometry.is_some(),
             innovations,
         })
+    }
+
+    /// Protection levels where the filter settles, with the variances of single pseudoranges that their
+    /// innovations speak for.
+    fn protection(
+        &self,
+        state: &NavState,
+        innovations: &Innovations,
+        above: &BTreeSet<SatelliteId>,
+        covariance: &Covariance,
+    ) -> Option<ProtectionLevels> {
+        let used = innovations.satellites().iter();
+        let ranged: Vec<Ranged> = used
+            .filter(|s| above.contains(&s.satellite))
+            .map(|s| Ranged {
+                look: s.look,
+                sigma_m: match self.excess.get(&s.satellite) {
+                    Some(excess) => excess.sigma_m,
+                    None => s.code.noise_variance().sqrt(),
+                },
+            })
+            .collect();
+        let position = Matrix3::from_fn(|row, column| covariance[(2 * row, 2 * column)]);
+        let to_enu = Geodetic::from_ecef(&state.position_ecef_m).enu_from_ecef();
+        let enu = to_enu * position * to_enu.transpose();
+        integrity::levels_of(&ranged, Some(&enu), &IntegritySettings::default()).ok()?
     }
 
     /// The measurements with the variances that their innovations speak for.
@@ -236,13 +271,15 @@ impl Kinematic {
                 let mean = |old: Option<f64>, new: f64| {
                     old.map_or(new, |old| memory * old + (1.0 - memory) * new)
                 };
-                let learnt = Excess {
+                let mut learnt = Excess {
                     code: mean(known.map(|e| e.code), code_now),
                     rate: mean(known.map(|e| e.rate), rate_now),
+                    sigma_m: 0.0,
                     seen: now,
                 };
-                self.excess.insert(m.satellite, learnt);
                 let code = learnt.code.max(code_now);
+                learnt.sigma_m = (code * i.code.noise_variance()).sqrt();
+                self.excess.insert(m.satellite, learnt);
                 let beyond_m2 = (code - 1.0) * i.code.noise_variance();
                 Measurement {
                     pseudorange_variance_m2: code_share * (m.pseudorange_variance_m2 + beyond_m2),

@@ -6,7 +6,6 @@
 mod fault;
 mod kinematic;
 mod noise;
-mod particle;
 mod report;
 mod session;
 mod single_point;
@@ -17,23 +16,13 @@ mod tests;
 use gnss_nav::Klobuchar;
 use gnss_nav::integrity::IntegritySettings;
 
+use crate::raim::Raim;
+
 pub use fault::{FaultShape, InjectedFault};
 pub use kinematic::KinematicSettings;
 pub use noise::Weights;
-pub use particle::ParticleRaim;
 pub use session::SolveSession;
 pub use solver::{SolveOutcome, Solver};
-
-/// Receiver autonomous integrity monitoring.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Raim {
-    /// None.
-    None,
-    /// Residuals and parity space, each epoch by itself.
-    LeastSquares(IntegritySettings),
-    /// Particle filters, for a receiver at rest.
-    Particle(ParticleRaim),
-}
 
 /// Settings of [`Solver`].
 #[derive(Debug, Clone, PartialEq)]

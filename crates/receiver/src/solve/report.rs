@@ -1,6 +1,5 @@
 //! Records of an epoch.
 
-use gnss_nav::integrity::{Misfit, Place};
 use gnss_nav::{GpsTime, RawMeasurement};
 
 use super::kinematic::Estimate;
@@ -8,8 +7,8 @@ use super::single_point::Fix;
 use super::solver::Solved;
 use crate::pipeline::{filter_record, innovation, solution_record};
 use crate::record::{
-    CarrierPhase, ChannelRecord, Disposition, EventKind, InnovationRecord, Observation,
-    ObservationEpoch, PvtRecord, Source, Status,
+    CarrierPhase, ChannelRecord, Disposition, InnovationRecord, Observation, ObservationEpoch,
+    PvtRecord, Source, Status,
 };
 use crate::rinex_obs::ObservedSatellite;
 
@@ -38,6 +37,8 @@ pub(super) fn filtered(time_s: f64, estimate: &Estimate) -> PvtRecord {
     PvtRecord {
         satellites_used: estimate.satellites,
         pdop: estimate.pdop,
+        horizontal_protection_m: estimate.protection.map(|p| p.horizontal_m),
+        vertical_protection_m: estimate.protection.map(|p| p.vertical_m),
         ..filter_record(time_s, state, &estimate.covariance, status)
     }
 }
@@ -125,19 +126,5 @@ pub(super) fn channel(
         shown: None,
         disposition,
         scores: Vec::new(),
-    }
-}
-
-/// Why a satellite is left out, as an event; `monitor` found it, if not the parity.
-pub(super) fn exclusion(misfit: &Misfit, monitor: Option<&str>) -> EventKind {
-    EventKind::Excluded {
-        monitor: match misfit.place {
-            Place::InUse => monitor.unwrap_or("parity"),
-            Place::Unused => "residual_below_mask",
-        }
-        .to_owned(),
-        score: misfit.score,
-        threshold: misfit.threshold,
-        residual_m: Some(misfit.residual_m).filter(|m| m.is_finite()),
     }
 }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use gnss_nav::{EphemerisStore, Klobuchar};
 use nalgebra::Vector3;
 
-use super::{InjectedFault, Raim, SolveOutcome, Solver};
+use super::{InjectedFault, SolveOutcome, Solver};
 use crate::ReceiverError;
 use crate::config::{Ionosphere, SolveConfig};
 use crate::cost::Meter;
@@ -63,7 +63,13 @@ impl SolveSession {
         } = self;
         let mut outputs = Outputs::open(&OutputSettings {
             directory: config.out.clone(),
-            monitors: monitors(&config),
+            monitors: config
+                .settings
+                .raim
+                .scored()
+                .map(str::to_owned)
+                .into_iter()
+                .collect(),
             position_file: true,
             title: "GPS positions from observations".to_owned(),
             ..OutputSettings::default()
@@ -79,14 +85,6 @@ impl SolveSession {
             write_cost(directory, &cost)?;
         }
         Ok(summary)
-    }
-}
-
-/// Monitors whose scores are written.
-fn monitors(config: &SolveConfig) -> Vec<String> {
-    match config.settings.raim {
-        Raim::Particle(which) => vec![which.name().to_owned()],
-        Raim::None | Raim::LeastSquares(_) => Vec::new(),
     }
 }
 

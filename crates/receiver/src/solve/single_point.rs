@@ -1,9 +1,11 @@
-//! One epoch by itself: least squares, with or without a test of its integrity.
+//! One epoch: least squares, with or without a test of its integrity.
 
-use gnss_nav::integrity::{self, IntegritySettings, Misfit, Place, ProtectionLevels};
+use gnss_nav::integrity::{self, Assured, Misfit, Place, ProtectionLevels};
 use gnss_nav::least_squares::Consistency;
-use gnss_nav::{Measurement, MeasurementModel, NavError, SatelliteId, Solution, least_squares};
+use gnss_nav::{Measurement, MeasurementModel, NavError, SatelliteId, Solution};
 use nalgebra::Vector3;
+
+use crate::raim::{Raim, RaimWatch};
 
 /// Satellites a position needs.
 const NEEDED: usize = 4;
@@ -51,54 +53,37 @@ impl Chosen {
     }
 }
 
-/// Solves an epoch from `start_ecef_m`, any place, without a test.
+/// Solves the epoch `time_s` from `start_ecef_m`, any place, and takes out what `watch` finds not to fit. Unused
+/// satellites are held against the solution.
 ///
 /// # Errors
-/// As [`least_squares::solve`].
-pub(super) fn untested(
-    chosen: &Chosen,
+/// As [`gnss_nav::least_squares::solve`].
+pub(super) fn solve(
+    (time_s, chosen): (f64, &Chosen),
     model: &MeasurementModel,
     start_ecef_m: &Vector3<f64>,
     most_pdop: f64,
+    (raim, watch): (Raim, &mut RaimWatch),
 ) -> Result<Fix, NavError> {
-    let solution = least_squares::solve(&chosen.used, model, start_ecef_m)?;
-    Ok(Fix {
-        is_trusted: !chosen.with_weak && solution.dops.pdop <= most_pdop,
+    let Assured {
         solution,
-        misfits: Vec::new(),
-        protection: None,
-    })
-}
-
-/// The same, tested by its residuals; what does not fit is taken out. Unused satellites are held
-/// against the solution.
-///
-/// # Errors
-/// As [`least_squares::solve`].
-pub(super) fn tested(
-    chosen: &Chosen,
-    model: &MeasurementModel,
-    start_ecef_m: &Vector3<f64>,
-    most_pdop: f64,
-    settings: &IntegritySettings,
-) -> Result<Fix, NavError> {
-    let assured = integrity::solve(&chosen.used, model, start_ecef_m, settings)?;
-    let solution = assured.solution;
-    let mut misfits = assured.misfits;
+        mut misfits,
+        protection,
+    } = watch.epoch(time_s, &chosen.used, model, start_ecef_m)?;
     let agrees = if chosen.with_weak {
         solution.consistency == Consistency::Passed && solution.excluded.is_empty()
     } else {
         solution.consistency != Consistency::Failed
     };
-    misfits.extend(integrity::misfits_among(
-        chosen.unused.iter(),
-        model,
-        &solution,
-        settings,
-    )?);
+    if let Some(settings) = raim.settings() {
+        let unused = chosen.unused.iter();
+        misfits.extend(integrity::misfits_among(
+            unused, model, &solution, &settings,
+        )?);
+    }
     Ok(Fix {
         is_trusted: agrees && solution.dops.pdop <= most_pdop,
-        protection: assured.protection,
+        protection,
         solution,
         misfits,
     })

@@ -9,10 +9,10 @@ use gnss_nav::{
 use nalgebra::Vector3;
 
 use super::kinematic::{Estimate, Kinematic};
-use super::particle::ParticleWatch;
 use super::single_point::{self, Chosen, Fix};
-use super::{InjectedFault, Raim, SolveSettings, report};
+use super::{InjectedFault, SolveSettings, report};
 use crate::ReceiverError;
+use crate::raim::{Raim, RaimWatch};
 use crate::record::{Event, EventKind, PvtRecord, Record, ScoreRecord, Status};
 use crate::rinex_obs::{ObservedEpoch, ObservedSatellite};
 
@@ -36,7 +36,7 @@ pub struct Solver {
     /// Injected faults whose satellite has been observed.
     occurred: Vec<bool>,
     kinematic: Option<Kinematic>,
-    watch: Option<ParticleWatch>,
+    watch: RaimWatch,
 }
 
 /// What an epoch gave.
@@ -87,12 +87,8 @@ impl Solver {
             elevation_mask_rad: settings.elevation_mask_rad,
             errors: settings.weights.errors(),
         };
-        let watch = match settings.raim {
-            Raim::Particle(which) => Some(ParticleWatch::new(which, settings.seed)?),
-            Raim::None | Raim::LeastSquares(_) => None,
-        };
         Ok(Self {
-            watch,
+            watch: RaimWatch::new(settings.raim, settings.seed)?,
             kinematic: settings
                 .kinematic
                 .map(|kinematic| Kinematic::new(kinematic, model)),
@@ -140,7 +136,7 @@ impl Solver {
         let formed = self.form(observed.time, &raw);
         self.counts.most_observed = self.counts.most_observed.max(raw.len());
         self.counts.most_formed = self.counts.most_formed.max(formed.measurements.len());
-        let fix = self.solve(time_s, &formed.measurements)?;
+        let fix = self.solve(time_s, &formed.measurements);
         if let Some(fix) = fix.as_ref().filter(|fix| fix.is_trusted) {
             self.position_ecef_m = fix.solution.position_ecef_m;
         }
@@ -160,27 +156,17 @@ impl Solver {
         self.report(time_s, observed, &raw, &solved, sink)
     }
 
-    /// The epoch by itself; `None` where it has no solution.
-    fn solve(
-        &mut self,
-        time_s: f64,
-        measurements: &[Measurement],
-    ) -> Result<Option<Fix>, ReceiverError> {
-        let (model, start) = (&self.model, &self.position_ecef_m);
-        let most_pdop = self.settings.most_pdop;
+    /// The epoch by itself; `None` where it has no solution, which is no error of the run.
+    fn solve(&mut self, time_s: f64, measurements: &[Measurement]) -> Option<Fix> {
         let chosen = Chosen::of(measurements, self.settings.cn0_mask_dbhz);
-        let solved = match (&self.settings.raim, &mut self.watch) {
-            (Raim::LeastSquares(settings), _) => {
-                single_point::tested(&chosen, model, start, most_pdop, settings)
-            }
-            (_, Some(watch)) => match watch.epoch(time_s, &chosen, model, start, most_pdop) {
-                Err(ReceiverError::Nav(error)) => Err(error),
-                other => return other.map(Some),
-            },
-            _ => single_point::untested(&chosen, model, start, most_pdop),
-        };
-        // What cannot be solved is no error of the run.
-        Ok(solved.ok())
+        single_point::solve(
+            (time_s, &chosen),
+            &self.model,
+            &self.position_ecef_m,
+            self.settings.most_pdop,
+            (self.settings.raim, &mut self.watch),
+        )
+        .ok()
     }
 
     /// Ends: how it went.
@@ -234,7 +220,7 @@ impl Solver {
         let fix = solved.fix.as_ref();
         let epoch = report::observations(time_s, observed.time, satellites, raw, fix);
         sink(Record::Observations(epoch))?;
-        let scores: Vec<ScoreRecord> = self.scores().into_iter().collect();
+        let scores: Vec<ScoreRecord> = self.watch.score().into_iter().collect();
         for (satellite, raw) in satellites.iter().zip(raw) {
             let mut channel = report::channel(time_s, satellite, raw, solved);
             channel.scores = scores.clone();
@@ -246,17 +232,6 @@ impl Solver {
             Some(pvt) => sink(Record::Pvt(pvt.clone())),
             None => Ok(()),
         }
-    }
-
-    /// What the particle filters say of the whole epoch.
-    fn scores(&self) -> Option<ScoreRecord> {
-        let watch = self.watch.as_ref()?;
-        let judged = watch.judged()?;
-        Some(ScoreRecord {
-            monitor: watch.name().to_owned(),
-            score: judged.score(),
-            threshold: judged.threshold(),
-        })
     }
 
     /// Says which satellites are left out from here on, and which no longer.
@@ -271,8 +246,7 @@ impl Solver {
         let before = std::mem::replace(&mut self.excluded, now);
         for misfit in &fix.misfits {
             if !before.contains(&misfit.satellite) {
-                let monitor = self.watch.as_ref().map(ParticleWatch::name);
-                let kind = report::exclusion(misfit, monitor);
+                let kind = self.watch.exclusion(misfit);
                 emit(sink, time_s, Some(misfit.satellite), kind)?;
             }
         }

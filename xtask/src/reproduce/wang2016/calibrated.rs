@@ -1,8 +1,8 @@
 //! Correlated noise: fitted, a threshold for it, and whether that keeps its word.
 
 use anyhow::Result;
-use fault_ml::CorrelatedNoise;
 use fault_ml::particle::Calibration;
+use fault_ml::{CorrelatedNoise, Sight};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
@@ -44,6 +44,7 @@ impl Calibrated {
         let deviation_m = 1.8;
         let truth = CorrelatedNoise {
             bias_sigma_m: 0.0,
+            bias_tail_share: 0.0,
             markov_sigma_m: 0.7f64.sqrt() * deviation_m,
             markov_time_s: 60.0,
             white_sigma_m: 0.3f64.sqrt() * deviation_m,
@@ -57,9 +58,18 @@ impl Calibrated {
             ratio: fault_ml::particle::RatioForm::Sound,
             ..bootstrap()
         };
-        let designs = &geometry[0];
+        let sights: Vec<Sight> = (0..)
+            .zip(&geometry[0])
+            .map(|(id, design)| Sight {
+                id,
+                design: *design,
+                residual_m: 0.0,
+                sigma_m,
+            })
+            .collect();
         let checked = parameters.check()?;
-        let threshold = CALIBRATION.threshold(&checked, designs, sigma_m, &fitted, &mut random)?;
+        let noise = fitted.scaled(1.0 / sigma_m);
+        let threshold = CALIBRATION.threshold(&checked, &sights, &noise, &mut random)?;
         let campaign = Campaign {
             truth: Truth {
                 noise: TrueNoise::Correlated,

@@ -80,7 +80,7 @@ impl Kind {
             }
             Self::InnovationGlr(parameters) => {
                 let parameters = parameters.check()?;
-                Detector::InnovationGlr(InnovationGlr::new(&parameters, SATELLITES, WINDOW))
+                Detector::InnovationGlr(InnovationGlr::new(&parameters, WINDOW))
             }
             Self::ParityGlr => Detector::ParityGlr(ParityGlr::new(WINDOW)),
             Self::ChiSquare => Detector::ChiSquare,
@@ -108,7 +108,7 @@ impl Detector {
                 without_particles(decisions, bank.state_m())
             }
             Self::InnovationGlr(glr) => {
-                let decision = largest(glr.epoch(sights).into_iter());
+                let decision = largest(glr.epoch(1.0, sights).into_iter());
                 without_particles(vec![decision], glr.state_m())
             }
             Self::ParityGlr(glr) => {

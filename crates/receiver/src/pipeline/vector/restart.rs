@@ -1,14 +1,18 @@
 //! The filter taken up anew: after a step of the clock, with another model of the delays, or from least
 //! squares.
 
-use gnss_nav::{Measurement, MeasurementModel, Solution, least_squares};
+use gnss_nav::integrity::{self, IntegritySettings};
+use gnss_nav::least_squares::Consistency;
+use gnss_nav::{Measurement, MeasurementModel, Solution};
 
 use super::clock_step::ClockStep;
 use super::filter::{filter, from_solution};
 use super::{Epoch, Outlook, VectorTracking};
 use crate::ReceiverError;
-use crate::pipeline::navigator::EXCLUSION_FALSE_ALARM;
 use crate::record::EventKind;
+
+/// Satellites a fix to start anew from may leave out: most channels may contradict the filter.
+const MOST_FAULTS: usize = 4;
 
 impl VectorTracking {
     /// Follows a step of the receiver's clock.
@@ -55,15 +59,16 @@ impl VectorTracking {
         channels: usize,
         epoch: &mut Epoch,
     ) -> Result<(), ReceiverError> {
-        let solved = least_squares::solve_with_exclusion(
-            measurements,
-            &self.model,
-            &self.state().position_ecef_m,
-            EXCLUSION_FALSE_ALARM,
-        );
+        let settings = IntegritySettings {
+            most_faults: MOST_FAULTS,
+            ..IntegritySettings::default()
+        };
+        let start = &self.state().position_ecef_m;
+        let solved = integrity::solve(measurements, &self.model, start, &settings);
         self.faults.clear();
-        let consistent = |s: &Solution| s.consistency == least_squares::Consistency::Passed;
-        let Some(solution) = solved.ok().filter(consistent) else {
+        let solved = solved.ok().map(|assured| assured.solution);
+        let consistent = |s: &Solution| s.consistency == Consistency::Passed;
+        let Some(solution) = solved.filter(consistent) else {
             self.outlook = Outlook::Contradicted;
             return Ok(());
         };

@@ -2,20 +2,12 @@
 
 use anyhow::{Context, Result};
 use fault_ml::Sight;
-use fault_ml::classical::{InnovationGlr, KalmanParameters, LeastSquaresFit, ParityGlr};
+use fault_ml::classical::{GlrParameters, InnovationGlr, LeastSquaresFit, ParityGlr};
 use fault_ml::particle::{ParticleParameters, ParticleRaim, RatioForm, Response};
-use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 /// Window of the likelihood ratios, epochs.
 const WINDOW: usize = 30;
-
-/// Filter of the likelihood ratio on innovations: a median of residuals, which the clock follows, moves by
-/// about a metre.
-const KALMAN: KalmanParameters = KalmanParameters {
-    initial_sigma_m: 3.0,
-    process_noise_m: 0.5,
-};
 
 /// What to judge with.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -56,21 +48,21 @@ impl Detector {
     ///
     /// # Errors
     /// Where its parameters are not possible.
-    pub fn start(kind: Kind, satellites: usize, seed: u64) -> Result<Self> {
+    pub fn start(kind: Kind, random: ChaCha8Rng) -> Result<Self> {
         Ok(match kind {
             Kind::Particle(parameters) => {
                 let observing = ParticleParameters {
                     response: Response::Observe,
                     ..parameters
                 };
-                let random = ChaCha8Rng::seed_from_u64(seed);
                 Self::Particle(Box::new(ParticleRaim::new(observing.check()?, random)))
             }
             Kind::ChiSquare => Self::ChiSquare,
             Kind::ParityGlr => Self::ParityGlr(ParityGlr::new(WINDOW)),
-            Kind::InnovationGlr => {
-                Self::InnovationGlr(InnovationGlr::new(&KALMAN.check()?, satellites, WINDOW))
-            }
+            Kind::InnovationGlr => Self::InnovationGlr(InnovationGlr::new(
+                &GlrParameters::default().filter.check()?,
+                WINDOW,
+            )),
         })
     }
 
@@ -92,7 +84,7 @@ impl Detector {
                 (fit.chi_square, fit.worst().context("no redundancy")?)
             }
             Self::ParityGlr(glr) => largest(&glr.epoch(sights, &fit()?)),
-            Self::InnovationGlr(glr) => largest(&glr.epoch(sights)),
+            Self::InnovationGlr(glr) => largest(&glr.epoch(1.0, sights)),
         })
     }
 }

@@ -1,4 +1,5 @@
-//! A quarter of an hour of real pseudoranges of a receiver at rest, as sights.
+//! A quarter of an hour of real pseudoranges of a receiver at rest, as sights: what detectors are
+//! judged on. What is known of its noise comes from elsewhere ([`super::noise`]).
 
 use std::path::{Path, PathBuf};
 
@@ -38,20 +39,7 @@ impl Record {
     }
 
     fn from_files(obs: &Path, nav: &Path) -> Result<Self> {
-        let nav = rinex_nav::read(nav)?;
-        let mut store = EphemerisStore::new();
-        for ephemeris in nav.ephemerides {
-            store.insert(ephemeris);
-        }
-        let model = MeasurementModel {
-            ionosphere: nav.ionosphere,
-            troposphere: true,
-            elevation_mask_rad: 10f64.to_radians(),
-            errors: Weights::default().errors(),
-        };
-        let observed: Vec<ObservedEpoch> =
-            ObservationReader::open(obs)?.collect::<Result<_, _>>()?;
-        let formed: Vec<Vec<Measurement>> = observed.iter().map(|e| form(e, &store)).collect();
+        let Observed { model, formed } = Observed::read(obs, nav)?;
         let first = formed.first().context("no epoch")?;
         let start = least_squares::solve(first, &model, &Vector3::zeros())?;
         let here = start.position_ecef_m;
@@ -74,12 +62,12 @@ impl Record {
         })
     }
 
-    /// The same with the deviation `sigma_m` for every satellite.
+    /// The same with `factor` times the stated deviations.
     #[must_use]
-    pub fn with_sigma(&self, sigma_m: f64) -> Self {
+    pub fn told(&self, factor: f64) -> Self {
         let mut told = self.clone();
         for sight in told.epochs.iter_mut().flatten() {
-            sight.sigma_m = sigma_m;
+            sight.sigma_m *= factor;
         }
         told
     }
@@ -92,9 +80,38 @@ impl Record {
 }
 
 /// Folder of the recordings: `GNSS_TEST_DATA`, or `../shared/data` beside the workspace.
-fn folder() -> PathBuf {
+pub(super) fn folder() -> PathBuf {
     let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
     std::env::var_os("GNSS_TEST_DATA").map_or(beside, PathBuf::from)
+}
+
+/// Measurements of a recording as `receiver solve` forms and weighs them.
+pub(super) struct Observed {
+    pub(super) model: MeasurementModel,
+    /// Epoch by epoch.
+    pub(super) formed: Vec<Vec<Measurement>>,
+}
+
+impl Observed {
+    pub(super) fn read(obs: &Path, nav: &Path) -> Result<Self> {
+        let nav = rinex_nav::read(nav)?;
+        let mut store = EphemerisStore::new();
+        for ephemeris in nav.ephemerides {
+            store.insert(ephemeris);
+        }
+        let model = MeasurementModel {
+            ionosphere: nav.ionosphere,
+            troposphere: true,
+            elevation_mask_rad: 10f64.to_radians(),
+            errors: Weights::default().errors(),
+        };
+        let epochs = ObservationReader::open(obs)?;
+        let formed = epochs.map(|epoch| Ok(form(&epoch?, &store)));
+        Ok(Self {
+            model,
+            formed: formed.collect::<Result<_>>()?,
+        })
+    }
 }
 
 fn form(epoch: &ObservedEpoch, store: &EphemerisStore) -> Vec<Measurement> {
@@ -107,14 +124,14 @@ fn form(epoch: &ObservedEpoch, store: &EphemerisStore) -> Vec<Measurement> {
     measurement::form(epoch.time, &raw, store).measurements
 }
 
-fn is_above(m: &Measurement, model: &MeasurementModel, here: &Vector3<f64>) -> bool {
+pub(super) fn is_above(m: &Measurement, model: &MeasurementModel, here: &Vector3<f64>) -> bool {
     let look = model.predict(&m.state, here, m.receive_time).look;
     look.elevation_rad >= model.elevation_mask_rad
 }
 
 /// Sights in east, north, up about `here`; the receiver's clock, the median residual, is taken off as a
 /// monitor does.
-fn sights<'a>(
+pub(super) fn sights<'a>(
     measurements: impl Iterator<Item = &'a Measurement>,
     model: &MeasurementModel,
     here: &Vector3<f64>,

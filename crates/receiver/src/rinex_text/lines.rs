@@ -13,7 +13,7 @@ const LONGEST: u64 = 1 << 16;
 const BUFFER: usize = 1 << 16;
 
 /// Lines of a text without their ends, numbered from 1.
-pub(super) struct Lines {
+pub(crate) struct Lines {
     reader: Box<dyn BufRead>,
     text: Vec<u8>,
     number: u64,
@@ -22,7 +22,7 @@ pub(super) struct Lines {
 
 impl Lines {
     /// Opens a file, compressed by gzip or not.
-    pub(super) fn open(path: &Path) -> io::Result<Self> {
+    pub(crate) fn open(path: &Path) -> io::Result<Self> {
         let mut reader = BufReader::with_capacity(BUFFER, File::open(path)?);
         let is_gzip = reader.fill_buf()?.starts_with(&[0x1f, 0x8b]);
         Ok(if is_gzip {
@@ -33,7 +33,7 @@ impl Lines {
         })
     }
 
-    pub(super) fn new(reader: Box<dyn BufRead>) -> Self {
+    pub(crate) fn new(reader: Box<dyn BufRead>) -> Self {
         Self {
             reader,
             text: Vec::new(),
@@ -43,22 +43,22 @@ impl Lines {
     }
 
     /// Number of the line read last.
-    pub(super) const fn number(&self) -> u64 {
+    pub(crate) const fn number(&self) -> u64 {
         self.number
     }
 
     /// The line read last.
-    pub(super) fn current(&self) -> &[u8] {
+    pub(crate) fn current(&self) -> &[u8] {
         &self.text
     }
 
     /// Lets the next [`Self::advance`] stay at the current line.
-    pub(super) fn hold(&mut self) {
+    pub(crate) fn hold(&mut self) {
         self.is_held = true;
     }
 
     /// Reads the next line into [`Self::current`]; false at the end.
-    pub(super) fn advance(&mut self) -> io::Result<bool> {
+    pub(crate) fn advance(&mut self) -> io::Result<bool> {
         if std::mem::take(&mut self.is_held) {
             return Ok(true);
         }
@@ -84,13 +84,18 @@ impl Lines {
 }
 
 /// Columns `from..to` of a line, as far as there are any, without blanks around them.
-pub(super) fn columns(line: &[u8], from: usize, to: usize) -> &[u8] {
+pub(crate) fn columns(line: &[u8], from: usize, to: usize) -> &[u8] {
     let end = to.min(line.len());
     line.get(from..end).unwrap_or_default().trim_ascii()
 }
 
+/// The label of a header line.
+pub(crate) fn label(line: &[u8]) -> &[u8] {
+    columns(line, 60, 80)
+}
+
 /// The number in columns `from..to`; none where they hold none.
-pub(super) fn number<T: std::str::FromStr>(line: &[u8], from: usize, to: usize) -> Option<T> {
+pub(crate) fn number<T: std::str::FromStr>(line: &[u8], from: usize, to: usize) -> Option<T> {
     std::str::from_utf8(columns(line, from, to))
         .ok()?
         .parse()
@@ -98,7 +103,7 @@ pub(super) fn number<T: std::str::FromStr>(line: &[u8], from: usize, to: usize) 
 }
 
 /// Bytes for an error message.
-pub(super) fn shown(text: &[u8]) -> String {
+pub(crate) fn shown(text: &[u8]) -> String {
     const MOST: usize = 40;
     let cut = text.get(..MOST).unwrap_or(text);
     String::from_utf8_lossy(cut)
