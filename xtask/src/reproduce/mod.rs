@@ -6,6 +6,7 @@ pub mod li2019;
 mod outcome;
 pub mod report;
 pub mod wang2016;
+pub mod zhang2014;
 pub mod zhu2020;
 
 use std::path::Path;
