@@ -1,6 +1,7 @@
 //! One run of the receiver over any source of correlator sums, with its files.
 
 use fault_ml::learned::ModelKind;
+use fault_ml::shape::ShapeSettings;
 use gnss_nav::GpsTime;
 use gnss_signal::{CorrelatorBank, SignalId};
 
@@ -8,7 +9,7 @@ use crate::ReceiverError;
 use crate::config::{Ionosphere, Mode, MonitorChoice, RunConfig, Troposphere};
 use crate::cost::Meter;
 use crate::models::default_model;
-use crate::pipeline::{self, Aiding, Outcome, Settings, VectorSettings};
+use crate::pipeline::{self, Aiding, Outcome, Settings, ShapeWatching, VectorSettings};
 use crate::rinex_nav::{self, NavigationFile};
 use crate::samples;
 use crate::sink::outputs::{Ending, OutputSettings, Outputs, write_cost};
@@ -107,6 +108,13 @@ fn settings(config: &RunConfig, nav: Option<NavigationFile>) -> Result<Settings,
         aiding,
         duration_s: config.recording.duration_s,
         dump_taps: config.dump_taps,
+        shape: config
+            .monitors
+            .contains(&MonitorChoice::Ewma)
+            .then_some(ShapeWatching {
+                chart: ShapeSettings::default(),
+                policy: config.policy,
+            }),
         vector: (config.mode == Mode::Vector)
             .then(|| vector(config))
             .transpose()?,
@@ -119,14 +127,14 @@ fn monitors(config: &RunConfig) -> Vec<String> {
     let running = config
         .monitors
         .iter()
-        .filter(|_| config.mode == Mode::Vector);
+        .filter(|m| config.mode == Mode::Vector || **m == MonitorChoice::Ewma);
     running.map(|monitor| monitor.name().to_owned()).collect()
 }
 
 fn vector(config: &RunConfig) -> Result<VectorSettings, ReceiverError> {
     let default = VectorSettings::default();
     let learned = config.monitors.iter().filter_map(|monitor| match monitor {
-        MonitorChoice::Innovation => None,
+        MonitorChoice::Innovation | MonitorChoice::Ewma => None,
         MonitorChoice::Svm => Some(ModelKind::Svm),
         MonitorChoice::Lstm => Some(ModelKind::Lstm),
     });

@@ -9,6 +9,10 @@ use crate::{Cadence, ChannelMonitor, ChannelVerdict, Judgement, MonitorError};
 /// Weight of a new difference in the deviation that a channel measures of itself: some 200 steps.
 const DEVIATION_WEIGHT: f64 = 0.005;
 
+/// Mean of the chart over the error of the range, by least squares over the reflections of
+/// `cargo xtask reproduce zhang2014`, for a front end of 1.6 MHz each side; 0.7 without a filter.
+const SLOPE: f64 = 0.4;
+
 /// Magnitudes of a channel's correlator sums over one integration, at [`SHAPE_TAPS_CHIPS`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Shape {
@@ -81,6 +85,12 @@ impl ShapeMonitor {
     #[must_use]
     pub const fn mean_chips(&self) -> f64 {
         self.chart.mean()
+    }
+
+    /// How much too long the measured range is taken to be, chips, by early and late half a chip apart.
+    #[must_use]
+    pub const fn error_chips(&self) -> f64 {
+        self.chart.mean() / SLOPE
     }
 
     fn observe(&mut self, observed: f64) {

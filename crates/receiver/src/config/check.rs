@@ -308,9 +308,9 @@ impl Checks<'_> {
     }
 
     fn monitors(&self, given: &RunOptions) -> Result<Vec<MonitorChoice>, ReceiverError> {
-        use MonitorChoice::{Innovation, Lstm, Svm};
-        let [innovation, svm, lstm] = [Innovation, Svm, Lstm].map(|m| (m.name(), Some(m)));
-        let choices = [innovation, svm, lstm, ("none", None)];
+        use MonitorChoice::{Ewma, Innovation, Lstm, Svm};
+        let named = [Innovation, Svm, Lstm, Ewma].map(|m| (m.name(), Some(m)));
+        let choices: Vec<_> = named.into_iter().chain([("none", None)]).collect();
         let chosen = |name: &String| self.choice("monitor", Some(name), "", &choices);
         if given.monitor.is_empty() {
             return Ok(vec![Innovation]);

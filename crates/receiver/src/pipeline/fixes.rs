@@ -2,12 +2,14 @@
 
 use std::collections::BTreeSet;
 
-use gnss_nav::Solution;
+use gnss_nav::{SatelliteId, Solution};
 use gnss_signal::CorrelatorBank;
 
 use super::navigator::{EXCLUSION_FALSE_ALARM, Tracked};
 use super::report;
 use super::run::{Fixed, Run};
+use super::slot::Slot;
+use super::vector;
 use crate::ReceiverError;
 use crate::record::{EventKind, Record};
 
@@ -15,6 +17,9 @@ impl<B: CorrelatorBank> Run<'_, B> {
     /// Position, velocity and time of this epoch by least squares, and all its records.
     pub(super) fn navigate(&mut self, now: u64) -> Result<(), ReceiverError> {
         let time_s = self.time_s(now);
+        for (satellite, kind) in self.follow_shapes() {
+            self.emit(now, Some(satellite), kind)?;
+        }
         let mut tracked: Vec<Tracked> = self
             .slots
             .iter_mut()
@@ -42,6 +47,15 @@ impl<B: CorrelatorBank> Run<'_, B> {
         } else {
             self.report_fix(now, Fixed::Before)
         }
+    }
+
+    /// Believes the satellites anew by the shapes of their correlations; returns what changed.
+    fn follow_shapes(&mut self) -> Vec<(SatelliteId, EventKind)> {
+        let change = |slot: &mut Slot| {
+            let (change, policy) = slot.shape.as_mut()?.follow()?;
+            Some((slot.satellite, vector::change(&change, policy)))
+        };
+        self.slots.iter_mut().filter_map(change).collect()
     }
 
     pub(super) fn report_fix(&mut self, now: u64, to: Fixed) -> Result<(), ReceiverError> {

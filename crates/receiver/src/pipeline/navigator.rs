@@ -3,6 +3,7 @@
 use gnss_nav::atmosphere::Klobuchar;
 use gnss_nav::coarse_time::{self, Prior, SnapshotMeasurement};
 use gnss_nav::constants::{L1_HZ, L1_WAVELENGTH_M, SPEED_OF_LIGHT_MPS};
+use gnss_nav::filter::Disposition;
 use gnss_nav::least_squares::{self, Consistency, Solution};
 use gnss_nav::measurement::{ErrorModel, Formed, MeasurementModel, RawMeasurement, form};
 use gnss_nav::prediction::{Expected, ReceiverState, predict};
@@ -401,7 +402,8 @@ impl Navigator {
                 ))
             })
             .collect();
-        let formed = form(receive_time, &raw, &self.store);
+        let believed: Vec<_> = raw.iter().filter_map(|r| believed(r, tracked)).collect();
+        let formed = form(receive_time, &believed, &self.store);
         (raw, formed)
     }
 
@@ -445,6 +447,25 @@ fn raw_measurement(
         range_rate_variance_m2: wavelength_m * wavelength_m * epoch.doppler_variance_hz2,
         cn0_dbhz: epoch.cn0_dbhz,
     }
+}
+
+/// A measurement as far as its satellite is believed.
+fn believed(raw: &RawMeasurement, tracked: &[Tracked]) -> Option<RawMeasurement> {
+    match shape_disposition(raw, tracked) {
+        Disposition::Use => Some(*raw),
+        Disposition::Deweight { variance_factor } => Some(RawMeasurement {
+            pseudorange_variance_m2: raw.pseudorange_variance_m2 * variance_factor,
+            ..*raw
+        }),
+        Disposition::Exclude => None,
+    }
+}
+
+/// What is to be done with a measurement by the shape of its satellite's correlation.
+pub(super) fn shape_disposition(raw: &RawMeasurement, tracked: &[Tracked]) -> Disposition {
+    let of = tracked.iter().find(|t| t.slot.satellite == raw.satellite);
+    let shape = of.and_then(|t| t.slot.shape.as_ref());
+    shape.map_or(Disposition::Use, |s| s.disposition(raw))
 }
 
 /// Whether the measurements of a solution contradict each other.

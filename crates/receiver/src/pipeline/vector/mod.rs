@@ -27,7 +27,9 @@ use gnss_nav::{
 use gnss_signal::tracking::{ChannelEpoch, Lock};
 use nalgebra::Vector3;
 
+use super::belief::Change;
 use super::navigator::EXCLUSION_FALSE_ALARM;
+use super::shape::{ShapeSaid, ShapeWatch};
 use super::slot::Slot;
 use crate::ReceiverError;
 use crate::record::EventKind;
@@ -35,17 +37,17 @@ use crate::record::EventKind;
 use clock_step::ClockStep;
 use filter::{filter, from_solution};
 pub(super) use monitors::Monitor;
-pub(super) use report::observations;
+pub(super) use report::{change, observations};
 pub use settings::{FilterKind, MeasurementNoise, Policy, VectorSettings};
 pub(super) use steering::steering;
-use watch::{Change, Watch};
+use watch::Watch;
 
 /// Satellites of a fix.
 const NEEDED: usize = 4;
 /// A position is predicted, not measured, once no fix's worth of satellites was used for so long, s.
 const STALE_S: f64 = 0.1;
 /// Healthy for so long, s, a satellite is believed again.
-const READMIT_S: f64 = 2.0;
+pub(super) const READMIT_S: f64 = 2.0;
 /// Time over which the receiver's acceleration is a mean, s: long enough that noise of velocities does
 /// not matter over the age of a measurement.
 const ACCELERATION_SPAN_S: f64 = 0.2;
@@ -80,6 +82,8 @@ pub(super) struct Member {
     pub(super) epoch: ChannelEpoch,
     pub(super) raw: Option<RawMeasurement>,
     pub(super) innovation: Option<SatelliteInnovation>,
+    /// What the shape of its correlation says, where that is watched.
+    pub(super) shape: Option<ShapeSaid>,
     /// What the filter was told of it; `None` where it had nothing to be told of.
     pub(super) disposition: Option<Disposition>,
     /// Whether the filter used its pseudorange.
@@ -248,6 +252,7 @@ impl VectorTracking {
             epoch,
             raw,
             innovation: None,
+            shape: slot.shape.as_ref().and_then(ShapeWatch::said),
             disposition: None,
             used: false,
             expected,
@@ -374,11 +379,15 @@ impl VectorTracking {
                 continue;
             };
             let step = monitors::step(innovation, &member.epoch);
+            let (shape, raw) = (member.shape, member.raw);
+            let variance_m2 = raw.map_or(f64::INFINITY, |r| r.pseudorange_variance_m2);
             let watch = self.watch(satellite);
-            let change = watch.judge(&step)?;
-            dispositions.push((satellite, watch.disposition(policy)));
+            let change = watch.judge(&step, shape)?;
+            let disposition = watch.disposition(policy, variance_m2.sqrt());
+            dispositions.push((satellite, disposition));
             if let Some(change) = change {
-                report::change(satellite, &change, policy, &mut epoch.events);
+                let kind = report::change(&change, policy);
+                epoch.events.push((Some(satellite), kind));
                 if change == Change::Cleared {
                     self.faults.forget(satellite);
                 }
@@ -434,7 +443,8 @@ impl VectorTracking {
             let Some(change) = self.watch(*satellite).isolate(skipped) else {
                 continue;
             };
-            report::change(*satellite, &change, policy, &mut epoch.events);
+            let kind = report::change(&change, policy);
+            epoch.events.push((Some(*satellite), kind));
         }
     }
 

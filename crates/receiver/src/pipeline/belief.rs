@@ -1,0 +1,150 @@
+//! Whether a satellite is believed, by what its monitors say.
+
+use fault_ml::{Health, Judgement};
+use gnss_nav::filter::{Disposition, FaultThresholds};
+
+use super::vector::Policy;
+
+/// Monitor and judgement.
+pub(super) type Said = (&'static str, Judgement);
+
+/// Whether a satellite is believed.
+#[derive(Debug, Clone)]
+pub(super) struct Belief {
+    suspended: Option<Suspended>,
+    clean_to_readmit: u32,
+}
+
+/// A satellite that is not believed.
+#[derive(Debug, Clone, Copy, Default)]
+struct Suspended {
+    clean_epochs: u32,
+}
+
+/// A change of what is believed.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Change {
+    /// Found faulty, by whom.
+    Alarm {
+        monitor: &'static str,
+        judgement: Judgement,
+    },
+    /// Found healthy again.
+    Cleared,
+}
+
+impl Belief {
+    /// A satellite of which nothing is known; once suspended it takes `clean_to_readmit` healthy epochs
+    /// to be believed again.
+    pub(super) const fn new(clean_to_readmit: u32) -> Self {
+        Self {
+            suspended: None,
+            clean_to_readmit,
+        }
+    }
+
+    /// One monitor is enough to suspend; to be believed again all that judge must find it healthy.
+    pub(super) fn follow(&mut self, judgements: &[Said]) -> Option<Change> {
+        if judgements.is_empty() {
+            return None;
+        }
+        let mut judgements = judgements.iter();
+        let faulty = judgements.find(|(_, judgement)| judgement.health() == Health::Faulty);
+        match (&mut self.suspended, faulty) {
+            (None, Some((monitor, judgement))) => {
+                self.suspended = Some(Suspended::default());
+                Some(Change::Alarm {
+                    monitor,
+                    judgement: *judgement,
+                })
+            }
+            (None, None) => None,
+            (Some(suspended), faulty) => {
+                suspended.clean_epochs = if faulty.is_some() {
+                    0
+                } else {
+                    suspended.clean_epochs + 1
+                };
+                let clean = suspended.clean_epochs >= self.clean_to_readmit;
+                if clean {
+                    self.suspended = None;
+                }
+                clean.then_some(Change::Cleared)
+            }
+        }
+    }
+
+    /// The gate refused measurements of `skipped` of the last epochs; returns what changed by it.
+    pub(super) fn isolate(&mut self, skipped: f64) -> Option<Change> {
+        if self.suspended.is_some() {
+            return None;
+        }
+        // So many epochs and more: the threshold itself is exceeded.
+        let threshold = f64::from(FaultThresholds::default().epochs_to_isolate) - 1.0;
+        let judgement = Judgement::new(skipped, threshold).ok()?;
+        self.suspended = Some(Suspended::default());
+        Some(Change::Alarm {
+            monitor: "gate",
+            judgement,
+        })
+    }
+
+    /// What is to be done with the satellite; `error_over_sigma` where a monitor says by how much its
+    /// pseudorange errs, in deviations of it.
+    pub(super) fn disposition(&self, policy: Policy, error_over_sigma: Option<f64>) -> Disposition {
+        match (self.suspended, policy) {
+            (None, _) | (_, Policy::Observe) => Disposition::Use,
+            (Some(_), Policy::Deweight { variance_factor }) => Disposition::Deweight {
+                variance_factor: error_over_sigma.map_or(variance_factor, |e| 1.0 + e * e),
+            },
+            (Some(_), Policy::Exclude) => Disposition::Exclude,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn said(score: f64) -> [Said; 1] {
+        [("ewma", Judgement::new(score, 1.0).unwrap())]
+    }
+
+    #[test]
+    fn an_alarm_lasts_until_it_was_healthy_long_enough() {
+        let mut belief = Belief::new(2);
+        assert_eq!(belief.follow(&said(0.5)), None);
+        assert!(matches!(
+            belief.follow(&said(1.5)),
+            Some(Change::Alarm { .. })
+        ));
+        assert_eq!(
+            belief.disposition(Policy::Exclude, None),
+            Disposition::Exclude
+        );
+        assert_eq!(belief.disposition(Policy::Observe, None), Disposition::Use);
+        for score in [0.5, 1.5, 0.5] {
+            assert_eq!(belief.follow(&said(score)), None);
+        }
+        assert_eq!(belief.follow(&[]), None);
+        assert_eq!(belief.follow(&said(0.5)), Some(Change::Cleared));
+        assert_eq!(belief.disposition(Policy::Exclude, None), Disposition::Use);
+    }
+
+    #[test]
+    fn weight_falls_with_the_error_that_is_suspected() {
+        let mut belief = Belief::new(2);
+        belief.follow(&said(1.5));
+        let deweight = Policy::Deweight {
+            variance_factor: 100.0,
+        };
+        let factor = |error| match belief.disposition(deweight, error) {
+            Disposition::Deweight { variance_factor } => variance_factor,
+            _ => 0.0,
+        };
+        assert_eq!(
+            [factor(None), factor(Some(3.0)), factor(Some(-3.0))],
+            [100.0, 10.0, 10.0]
+        );
+    }
+}
