@@ -7,7 +7,7 @@
 //! Two forms, as a monitor of one channel:
 //!
 //! - the paper's, from [`largest_tap`]: quantised to the distance of the taps, so that its limits come
-//!   from the tail of simulated closed loops, not from a deviation;
+//!   from the tail of simulated closed loops ([`closed_loop_chart`]), not from a deviation;
 //! - [`ShapeMonitor`], from [`FlankBalance`]: not quantised, blind to how the replica as a whole is
 //!   off, and with a deviation that each channel measures itself.
 //!
@@ -15,12 +15,14 @@
 
 mod balance;
 mod chart;
+mod closed_loop;
 mod monitor;
 pub mod observable;
 mod run_length;
 
 pub use balance::FlankBalance;
 pub use chart::{ChartSettings, EwmaChart};
+pub use closed_loop::closed_loop_chart;
 pub use monitor::{Shape, ShapeMonitor, ShapeSettings};
 pub use observable::{SHAPE_TAPS_CHIPS, fitted_peak, largest_tap};
 pub use run_length::average_run_length;

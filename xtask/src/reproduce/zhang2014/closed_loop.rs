@@ -178,6 +178,13 @@ impl ClosedLoop {
         }
     }
 
+    /// This loop with its replica `late_chips` late.
+    #[must_use]
+    pub const fn at(mut self, late_chips: f64) -> Self {
+        self.late_chips = late_chips;
+        self
+    }
+
     /// How late the replica is, chips.
     #[must_use]
     pub const fn late_chips(&self) -> f64 {

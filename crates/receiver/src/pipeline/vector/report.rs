@@ -1,7 +1,7 @@
 //! Records of vector tracking.
 
-use gnss_nav::filter::Disposition;
 use gnss_nav::GpsTime;
+use gnss_nav::filter::Disposition;
 use gnss_signal::tracking::Lock;
 
 use super::watch::Watch;
