@@ -7,7 +7,7 @@ const LAMBDA: f64 = 0.02;
 
 /// C/N0, dB-Hz, deviation of the largest tap and limit of its mean, chips.
 const TABLE: [(f64, f64, f64); 7] = [
-    (32.0, 0.238, 0.1400),
+    (32.0, 0.238, 0.1460),
     (35.0, 0.202, 0.1240),
     (38.0, 0.152, 0.0965),
     (41.0, 0.0964, 0.0730),

@@ -3,6 +3,7 @@
 use fault_ml::{Health, Judgement};
 use gnss_nav::filter::{Disposition, FaultThresholds};
 
+use super::shape;
 use super::vector::Policy;
 
 /// Monitor and judgement.
@@ -16,9 +17,11 @@ pub(super) struct Belief {
 }
 
 /// A satellite that is not believed.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 struct Suspended {
     clean_epochs: u32,
+    /// Another monitor than the chart on the shape found it faulty.
+    by_others: bool,
 }
 
 /// A change of what is believed.
@@ -48,11 +51,15 @@ impl Belief {
         if judgements.is_empty() {
             return None;
         }
-        let mut judgements = judgements.iter();
-        let faulty = judgements.find(|(_, judgement)| judgement.health() == Health::Faulty);
-        match (&mut self.suspended, faulty) {
+        let is_faulty = |said: &&Said| said.1.health() == Health::Faulty;
+        let mut faulty = judgements.iter().filter(is_faulty);
+        let by_others = faulty.clone().any(|(monitor, _)| *monitor != shape::NAME);
+        match (&mut self.suspended, faulty.next()) {
             (None, Some((monitor, judgement))) => {
-                self.suspended = Some(Suspended::default());
+                self.suspended = Some(Suspended {
+                    clean_epochs: 0,
+                    by_others,
+                });
                 Some(Change::Alarm {
                     monitor,
                     judgement: *judgement,
@@ -60,6 +67,7 @@ impl Belief {
             }
             (None, None) => None,
             (Some(suspended), faulty) => {
+                suspended.by_others |= by_others;
                 suspended.clean_epochs = if faulty.is_some() {
                     0
                 } else {
@@ -82,23 +90,37 @@ impl Belief {
         // So many epochs and more: the threshold itself is exceeded.
         let threshold = f64::from(FaultThresholds::default().epochs_to_isolate) - 1.0;
         let judgement = Judgement::new(skipped, threshold).ok()?;
-        self.suspended = Some(Suspended::default());
+        self.suspended = Some(Suspended {
+            clean_epochs: 0,
+            by_others: true,
+        });
         Some(Change::Alarm {
             monitor: "gate",
             judgement,
         })
     }
 
-    /// What is to be done with the satellite; `error_over_sigma` where a monitor says by how much its
-    /// pseudorange errs, in deviations of it.
+    /// What is to be done with the satellite; `error_over_sigma` where the shape of its correlation says by
+    /// how much its pseudorange errs, in deviations of it.
     pub(super) fn disposition(&self, policy: Policy, error_over_sigma: Option<f64>) -> Disposition {
         match (self.suspended, policy) {
             (None, _) | (_, Policy::Observe) => Disposition::Use,
-            (Some(_), Policy::Deweight { variance_factor }) => Disposition::Deweight {
-                variance_factor: error_over_sigma.map_or(variance_factor, |e| 1.0 + e * e),
-            },
+            (Some(_), Policy::Deweight { variance_factor }) => {
+                let weighted = self.weighted(error_over_sigma);
+                weighted.unwrap_or(Disposition::Deweight { variance_factor })
+            }
             (Some(_), Policy::Exclude) => Disposition::Exclude,
         }
+    }
+
+    /// The weight 1 / (sigma^2 + error^2) of a satellite that is suspended by the shape of its correlation
+    /// alone; `None` for others.
+    pub(super) fn weighted(&self, error_over_sigma: Option<f64>) -> Option<Disposition> {
+        let by_shape = self.suspended.is_some_and(|s| !s.by_others);
+        let error = error_over_sigma.filter(|_| by_shape)?;
+        Some(Disposition::Deweight {
+            variance_factor: 1.0 + error * error,
+        })
     }
 }
 
@@ -135,10 +157,11 @@ mod tests {
     fn weight_falls_with_the_error_that_is_suspected() {
         let mut belief = Belief::new(2);
         belief.follow(&said(1.5));
+        let alarmed = belief.clone();
         let deweight = Policy::Deweight {
             variance_factor: 100.0,
         };
-        let factor = |error| match belief.disposition(deweight, error) {
+        let factor = |error| match alarmed.disposition(deweight, error) {
             Disposition::Deweight { variance_factor } => variance_factor,
             _ => 0.0,
         };

@@ -51,6 +51,8 @@ pub(super) struct Navigated {
     pub(super) receive_time: Option<GpsTime>,
     /// The measurements, where the clock is good enough.
     pub(super) raw: Vec<RawMeasurement>,
+    /// What the solution did with each by the shape of its correlation.
+    pub(super) dispositions: Vec<Disposition>,
 }
 
 impl Navigated {
@@ -60,6 +62,7 @@ impl Navigated {
             fix: None,
             receive_time: None,
             raw: Vec::new(),
+            dispositions: Vec::new(),
         }
     }
 
@@ -276,6 +279,7 @@ impl Navigator {
         Navigated {
             receive_time: self.clock.map(|c| c.at(tick)),
             fix: solved.ok().map(|s| (s, Source::LeastSquares)),
+            dispositions: shape_dispositions(&raw, tracked),
             raw,
         }
     }
@@ -290,6 +294,7 @@ impl Navigator {
         Navigated {
             fix,
             receive_time: self.clock.filter(|_| exact).map(|c| c.at(tick)),
+            dispositions: Vec::new(),
             raw,
         }
     }
@@ -402,7 +407,9 @@ impl Navigator {
                 ))
             })
             .collect();
-        let believed: Vec<_> = raw.iter().filter_map(|r| believed(r, tracked)).collect();
+        let told = shape_dispositions(&raw, tracked);
+        let both = raw.iter().zip(told);
+        let believed: Vec<_> = both.filter_map(|(r, told)| weighted(r, told)).collect();
         let formed = form(receive_time, &believed, &self.store);
         (raw, formed)
     }
@@ -449,9 +456,29 @@ fn raw_measurement(
     }
 }
 
-/// A measurement as far as its satellite is believed.
-fn believed(raw: &RawMeasurement, tracked: &[Tracked]) -> Option<RawMeasurement> {
-    match shape_disposition(raw, tracked) {
+/// Fewer satellites make no solution.
+const NEEDED: usize = 4;
+
+/// Measurements and what is to be done with them by the shapes of their satellites' correlations: weighted,
+/// not left out, where too few would be left.
+fn shape_dispositions(raw: &[RawMeasurement], tracked: &[Tracked]) -> Vec<Disposition> {
+    let shape = |r: &RawMeasurement| {
+        let mut of = tracked.iter().filter(|t| t.slot.satellite == r.satellite);
+        of.find_map(|t| t.slot.shape.as_ref())
+    };
+    let told = |r: &RawMeasurement| shape(r).map_or(Disposition::Use, |s| s.disposition(r));
+    let all: Vec<_> = raw.iter().map(told).collect();
+    let left = all.iter().filter(|d| **d != Disposition::Exclude).count();
+    if left == all.len() || left >= NEEDED {
+        return all;
+    }
+    let weighted = |r: &RawMeasurement| shape(r).map_or(Disposition::Use, |s| s.weighted(r));
+    raw.iter().map(weighted).collect()
+}
+
+/// A measurement with its weight, unless it is left out.
+fn weighted(raw: &RawMeasurement, disposition: Disposition) -> Option<RawMeasurement> {
+    match disposition {
         Disposition::Use => Some(*raw),
         Disposition::Deweight { variance_factor } => Some(RawMeasurement {
             pseudorange_variance_m2: raw.pseudorange_variance_m2 * variance_factor,
@@ -459,13 +486,6 @@ fn believed(raw: &RawMeasurement, tracked: &[Tracked]) -> Option<RawMeasurement>
         }),
         Disposition::Exclude => None,
     }
-}
-
-/// What is to be done with a measurement by the shape of its satellite's correlation.
-pub(super) fn shape_disposition(raw: &RawMeasurement, tracked: &[Tracked]) -> Disposition {
-    let of = tracked.iter().find(|t| t.slot.satellite == raw.satellite);
-    let shape = of.and_then(|t| t.slot.shape.as_ref());
-    shape.map_or(Disposition::Use, |s| s.disposition(raw))
 }
 
 /// Whether the measurements of a solution contradict each other.

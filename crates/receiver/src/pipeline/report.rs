@@ -9,7 +9,7 @@ use gnss_signal::tracking::{ChannelEpoch, Lock};
 use nalgebra::{Matrix3, Vector3};
 
 use super::belief::Said;
-use super::navigator::{Navigated, Tracked, is_contradictory, shape_disposition};
+use super::navigator::{Navigated, Tracked, is_contradictory};
 use super::shape::{self, ShapeWatch};
 use super::slot::Slot;
 use crate::record::{
@@ -175,7 +175,7 @@ pub(super) fn channel(time_s: f64, tracked: &Tracked, navigated: &Navigated) -> 
         range_rate_mps: raw.map(|r| r.range_rate_mps),
         innovation_code_m,
         innovation_rate_mps,
-        disposition: disposition(tracked, navigated),
+        disposition: disposition(satellite, navigated),
         scores: shape
             .into_iter()
             .map(|s| score(&(shape::NAME, s.judgement)))
@@ -192,13 +192,14 @@ pub(super) fn score((monitor, judgement): &Said) -> ScoreRecord {
     }
 }
 
-fn disposition(tracked: &Tracked, navigated: &Navigated) -> Disposition {
-    let satellite = tracked.slot.satellite;
+fn disposition(satellite: SatelliteId, navigated: &Navigated) -> Disposition {
     let Some((solution, _)) = &navigated.fix else {
         return Disposition::Unavailable;
     };
-    let raw = navigated.raw.iter().find(|r| r.satellite == satellite);
-    let told = raw.map(|r| shape_disposition(r, std::slice::from_ref(tracked)));
+    let mut both = navigated.raw.iter().zip(&navigated.dispositions);
+    let told = both
+        .find(|(r, _)| r.satellite == satellite)
+        .map(|(_, told)| *told);
     if solution.excluded.contains(&satellite) || told == Some(Told::Exclude) {
         Disposition::Exclude
     } else if solution.satellites.iter().any(|s| s.satellite == satellite) {

@@ -87,8 +87,17 @@ impl ShapeWatch {
 
     /// What a solution of scalar tracking is to do with a measurement of the channel.
     pub(super) fn disposition(&self, raw: &RawMeasurement) -> Disposition {
-        let over_sigma = |s: ShapeSaid| s.error_m / raw.pseudorange_variance_m2.sqrt();
         self.belief
-            .disposition(self.watching.policy, self.said().map(over_sigma))
+            .disposition(self.watching.policy, self.error_over_sigma(raw))
+    }
+
+    /// The same where it cannot do without.
+    pub(super) fn weighted(&self, raw: &RawMeasurement) -> Disposition {
+        let weighted = self.belief.weighted(self.error_over_sigma(raw));
+        weighted.unwrap_or(Disposition::Use)
+    }
+
+    fn error_over_sigma(&self, raw: &RawMeasurement) -> Option<f64> {
+        Some(self.said()?.error_m / raw.pseudorange_variance_m2.sqrt())
     }
 }

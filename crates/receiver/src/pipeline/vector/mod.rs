@@ -373,6 +373,7 @@ impl VectorTracking {
     ) -> Result<Vec<(SatelliteId, Disposition)>, ReceiverError> {
         let policy = self.settings.policy;
         let mut dispositions = Vec::new();
+        let mut weighted = Vec::new();
         for innovation in innovations.satellites() {
             let satellite = innovation.satellite;
             let Some(member) = epoch.members.iter().find(|m| m.satellite == satellite) else {
@@ -384,6 +385,7 @@ impl VectorTracking {
             let watch = self.watch(satellite);
             let change = watch.judge(&step, shape)?;
             let disposition = watch.disposition(policy, variance_m2.sqrt());
+            weighted.push(watch.weighted(variance_m2.sqrt()).unwrap_or(disposition));
             dispositions.push((satellite, disposition));
             if let Some(change) = change {
                 let kind = report::change(&change, policy);
@@ -392,6 +394,11 @@ impl VectorTracking {
                     self.faults.forget(satellite);
                 }
             }
+        }
+        let left = dispositions.iter().filter(|d| d.1 != Disposition::Exclude);
+        if left.count() < NEEDED {
+            let each = dispositions.iter_mut().zip(weighted);
+            each.for_each(|((_, told), weighted)| *told = weighted);
         }
         Ok(dispositions)
     }

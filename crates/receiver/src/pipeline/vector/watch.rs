@@ -76,6 +76,13 @@ impl Watch {
         self.belief.disposition(policy, error_over_sigma)
     }
 
+    /// What the filter may do with the satellite where it cannot do without, if it is suspended by the shape of
+    /// its correlation alone.
+    pub(super) fn weighted(&self, sigma_m: f64) -> Option<Disposition> {
+        self.belief
+            .weighted(self.shape_error_m.map(|e| e / sigma_m))
+    }
+
     /// Monitor, score and threshold of the last epoch, of each that judged.
     pub(super) fn judgements(&self) -> &[Said] {
         &self.judgements
