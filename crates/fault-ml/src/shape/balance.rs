@@ -40,16 +40,18 @@ impl FlankBalance {
         if !(total > 0.0 && total.is_finite()) {
             return None;
         }
-        let [e4, e3, e2, e1, p, l1, l2, l3, l4] = magnitudes.map(|m| m / total);
+        let [e4, e3, e2, e1, p, l1, l2, l3, l4] = *magnitudes;
+        let scale = total.recip();
         // Means of both sides, per chip.
-        let inner = (p - e2 + p - l2) / 0.4;
-        let outer = (e2 - e4 + l2 - l4) / 0.4;
+        let inner = 2.5 * scale * (p - e2 + p - l2);
+        let outer = 2.5 * scale * (e2 - e4 + l2 - l4);
         self.shapes += 1.0;
         let weight = self.shapes.recip().max(SHAPE_WEIGHT);
         self.inner_slope += weight * (inner - self.inner_slope);
         self.outer_slope += weight * (outer - self.outer_slope);
         let is_peak = self.inner_slope > 0.0 && self.outer_slope > 0.0;
-        is_peak.then(|| (e1 - l1) / (2.0 * self.inner_slope) - (e3 - l3) / (2.0 * self.outer_slope))
+        let half = 0.5 * scale;
+        is_peak.then(|| half * ((e1 - l1) / self.inner_slope - (e3 - l3) / self.outer_slope))
     }
 
     /// Forgets all shapes.

@@ -14,9 +14,6 @@ use crate::ReceiverError;
 use crate::pipeline::{FilterKind, Policy};
 use crate::sigmf::{self, Sidecar};
 
-/// Factor on the variance of a satellite whose weight is lowered: a tenth of its deviation's say.
-const DEWEIGHTED: f64 = 100.0;
-
 /// Where an option was given, for errors.
 pub(super) enum Origin {
     CommandLine,
@@ -331,7 +328,7 @@ impl Checks<'_> {
 
     fn policy(&self, given: &RunOptions) -> Result<Policy, ReceiverError> {
         let deweight = Policy::Deweight {
-            variance_factor: DEWEIGHTED,
+            variance_factor: Policy::VARIANCE_FACTOR,
         };
         let policies = [
             ("observe", Policy::Observe),

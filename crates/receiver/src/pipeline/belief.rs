@@ -113,13 +113,17 @@ impl Belief {
         }
     }
 
-    /// The weight 1 / (sigma^2 + error^2) of a satellite that is suspended by the shape of its correlation
-    /// alone; `None` for others.
+    /// The weight 1 / (sigma^2 + error^2) of a suspended satellite of which the shape says the error, but no
+    /// more than usual where others suspended it; `None` where the shape says nothing.
     pub(super) fn weighted(&self, error_over_sigma: Option<f64>) -> Option<Disposition> {
-        let by_shape = self.suspended.is_some_and(|s| !s.by_others);
-        let error = error_over_sigma.filter(|_| by_shape)?;
+        let (suspended, error) = (self.suspended?, error_over_sigma?);
+        let least = if suspended.by_others {
+            Policy::VARIANCE_FACTOR
+        } else {
+            1.0
+        };
         Some(Disposition::Deweight {
-            variance_factor: 1.0 + error * error,
+            variance_factor: (1.0 + error * error).max(least),
         })
     }
 }
@@ -169,5 +173,13 @@ mod tests {
             [factor(None), factor(Some(3.0)), factor(Some(-3.0))],
             [100.0, 10.0, 10.0]
         );
+        // What others found faulty is not told by the shape.
+        let other = ("innovation", Judgement::new(5.0, 1.0).unwrap());
+        belief.follow(&[other, said(0.1)[0]]);
+        let usual = Disposition::Deweight {
+            variance_factor: Policy::VARIANCE_FACTOR,
+        };
+        assert_eq!(belief.weighted(Some(3.0)), Some(usual));
+        assert_eq!(belief.weighted(None), None);
     }
 }

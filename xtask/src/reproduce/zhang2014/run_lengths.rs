@@ -10,7 +10,7 @@ use super::closed_loop::Setting;
 /// C/N0, dB-Hz.
 const CN0_DBHZ: f64 = 44.0;
 /// Integrations simulated for a width.
-const STEPS: usize = 12_000_000;
+const STEPS: usize = 6_000_000;
 
 /// Run lengths of one width of the limits, steps of 1 ms.
 #[derive(Debug, Clone, Copy, PartialEq)]

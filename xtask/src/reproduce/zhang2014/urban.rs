@@ -25,7 +25,7 @@ const MASK_RAD: f64 = 15.0 * PI / 180.0;
 /// Most of them that have a reflection.
 pub const MOST: usize = 4;
 /// Scenarios of each number.
-pub const SCENARIOS: usize = 200;
+pub const SCENARIOS: usize = 100;
 /// Epochs of a scenario, a second apart, after a second in which the loops settle.
 const EPOCHS: usize = 14;
 const STEPS: usize = 1_000;

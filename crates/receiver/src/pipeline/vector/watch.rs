@@ -76,8 +76,8 @@ impl Watch {
         self.belief.disposition(policy, error_over_sigma)
     }
 
-    /// What the filter may do with the satellite where it cannot do without, if it is suspended by the shape of
-    /// its correlation alone.
+    /// What the filter may do with the satellite where it cannot do without, if it is suspended and the shape of
+    /// its correlation says how much it errs.
     pub(super) fn weighted(&self, sigma_m: f64) -> Option<Disposition> {
         self.belief
             .weighted(self.shape_error_m.map(|e| e / sigma_m))
