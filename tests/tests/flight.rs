@@ -1,5 +1,7 @@
-//! 107 ms of real signal received in flight: a coarse-time fix.
+//! 107 ms of real signal received in flight: a coarse-time fix, and vector tracking from there.
 #![allow(clippy::unwrap_used, reason = "a failure here is a failed test")]
+
+use std::collections::BTreeMap;
 
 use end_to_end_tests::{FLIGHT, number, receive, test_data};
 
@@ -44,5 +46,39 @@ fn a_tenth_of_a_second_in_flight_gives_position_velocity_and_time() {
             // The same minimum of the same squares, from another start.
             assert!((a - b).abs() < 0.01);
         }
+    }
+}
+
+#[test]
+fn vector_tracking_begins_with_the_first_fix_and_keeps_every_channel() {
+    let Some(data) = test_data() else { return };
+    let nav = data.join("if/braunschweig_flight/sxnsr_test_data_flight.12n");
+    let options = ["--nav", nav.to_str().unwrap(), "--time", "1672:391558"];
+    let speed_error = |row: &BTreeMap<String, String>| {
+        let names = ["vx_mps", "vy_mps", "vz_mps"];
+        let errors = names.iter().zip(VELOCITY);
+        let squares = errors.map(|(name, truth)| (number(row, name) - truth).powi(2));
+        squares.sum::<f64>().sqrt()
+    };
+    let snapshot = receive(&data, &FLIGHT, &options);
+    let vector = receive(
+        &data,
+        &FLIGHT,
+        &[&options[..], &["--mode", "vector"]].concat(),
+    );
+    let (before, after) = (snapshot.rows("pvt.csv"), vector.rows("pvt.csv"));
+    let fix = after.last().unwrap();
+    assert_eq!(fix["source"], "filter");
+    assert_eq!(fix["status"], "fix");
+    assert!(speed_error(fix) <= speed_error(before.last().unwrap()));
+    // By deviations that say so; an independent solution lies 6.9 m from the position.
+    for (name, truth) in ["x_m", "y_m", "z_m"].iter().zip(POSITION) {
+        assert!((number(fix, name) - truth).abs() < 15.0, "{name}");
+    }
+    let channels = vector.rows("channels.csv");
+    assert_eq!(channels.len(), 12);
+    for channel in &channels {
+        assert_eq!(channel["loop"], "vector");
+        assert_eq!(channel["disposition"], "use");
     }
 }

@@ -195,7 +195,9 @@ fn judge(scenario: &Scenario, pvt: PvtRecord) -> JudgedEpoch {
     let to_enu = Geodetic::from_ecef(&at.position_ecef_m).enu_from_ecef();
     JudgedEpoch {
         position_enu_m: to_enu * (pvt.position_ecef_m - at.position_ecef_m),
-        velocity_enu_mps: to_enu * (pvt.velocity_ecef_mps - at.velocity_ecef_mps),
+        // A velocity that is not known errs by all of it.
+        velocity_enu_mps: to_enu
+            * (pvt.velocity.map_or_else(Vector3::zeros, |v| v.ecef_mps) - at.velocity_ecef_mps),
         pvt,
     }
 }

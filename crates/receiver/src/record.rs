@@ -80,12 +80,10 @@ pub struct PvtRecord {
     pub time: GpsTime,
     /// Position, ECEF, m.
     pub position_ecef_m: Vector3<f64>,
-    /// Velocity, ECEF, m/s.
-    pub velocity_ecef_mps: Vector3<f64>,
+    /// Velocity and clock drift, where they were measured or predicted.
+    pub velocity: Option<VelocityRecord>,
     /// Receiver clock bias, m.
     pub clock_bias_m: f64,
-    /// Receiver clock drift, m/s.
-    pub clock_drift_mps: f64,
     /// Satellites in the solution.
     pub satellites_used: usize,
     /// Position dilution of precision.
@@ -96,8 +94,6 @@ pub struct PvtRecord {
     pub sigma_enu_m: [f64; 3],
     /// Covariance of the position, ECEF, m^2.
     pub position_covariance_ecef_m2: Matrix3<f64>,
-    /// Standard deviation of the speed (3-D), m/s.
-    pub sigma_velocity_mps: f64,
     /// Horizontal protection level, m.
     pub horizontal_protection_m: Option<f64>,
     /// Vertical protection level, m.
@@ -106,6 +102,17 @@ pub struct PvtRecord {
     pub status: Status,
     /// What a navigation filter says of its own estimate.
     pub filter: Option<Box<FilterRecord>>,
+}
+
+/// How a receiver moves, and what its clock does.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct VelocityRecord {
+    /// ECEF, m/s.
+    pub ecef_mps: Vector3<f64>,
+    /// Drift of the receiver's clock, m/s.
+    pub clock_drift_mps: f64,
+    /// Standard deviation of the speed (3-D), m/s.
+    pub sigma_mps: f64,
 }
 
 /// A navigation filter's own view of an epoch.

@@ -136,7 +136,8 @@ pub struct ErrorStatistics {
     /// Largest error in three dimensions, m.
     pub position_3d_max_m: f64,
     /// Root mean square of the velocity error.
-    pub velocity_rms_mps: VelocityError,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub velocity_rms_mps: Option<VelocityError>,
 }
 
 /// Velocity error by axis.
@@ -294,7 +295,7 @@ impl SummaryBuilder {
             mode_switch_s: self.mode_switch_s.map(|time_s| rounded(time_s, 6)),
             no_fix_reason: no_fix_reason.filter(|_| self.first_fix_s.is_none()),
             position: self.last.as_ref().map(position),
-            velocity: self.last.as_ref().map(velocity),
+            velocity: self.last.as_ref().and_then(velocity),
             time: self.last.as_ref().map(|pvt| Time {
                 week: pvt.time.week(),
                 tow_s: rounded(pvt.time.tow_s(), 9),
@@ -375,12 +376,12 @@ fn position(pvt: &PvtRecord) -> Position {
     }
 }
 
-fn velocity(pvt: &PvtRecord) -> Velocity {
-    Velocity {
-        vx_mps: rounded(pvt.velocity_ecef_mps.x, 5),
-        vy_mps: rounded(pvt.velocity_ecef_mps.y, 5),
-        vz_mps: rounded(pvt.velocity_ecef_mps.z, 5),
-    }
+fn velocity(pvt: &PvtRecord) -> Option<Velocity> {
+    pvt.velocity.map(|v| Velocity {
+        vx_mps: rounded(v.ecef_mps.x, 5),
+        vy_mps: rounded(v.ecef_mps.y, 5),
+        vz_mps: rounded(v.ecef_mps.z, 5),
+    })
 }
 
 #[cfg(test)]

@@ -107,8 +107,8 @@ pub struct SolutionError {
     pub time_s: f64,
     /// Position error east, north, up, m.
     pub position_enu_m: Vector3<f64>,
-    /// Velocity error east, north, up, m/s.
-    pub velocity_enu_mps: Vector3<f64>,
+    /// Velocity error east, north, up, m/s, where there is a velocity.
+    pub velocity_enu_mps: Option<Vector3<f64>>,
     /// Horizontal and vertical protection level stated, m.
     pub protection_m: Option<[f64; 2]>,
 }
@@ -150,13 +150,17 @@ pub fn compare(
             continue;
         };
         let position = Vector3::new(row.number(1)?, row.number(2)?, row.number(3)?);
-        let velocity = Vector3::new(row.number(4)?, row.number(5)?, row.number(6)?);
+        let velocity = if row.text(4).is_empty() {
+            None
+        } else {
+            Some(Vector3::new(row.number(4)?, row.number(5)?, row.number(6)?))
+        };
         let place = Geodetic::from_ecef(&true_point.position_ecef_m);
         let enu = place.enu_from_ecef();
         let error = SolutionError {
             time_s,
             position_enu_m: enu * (position - true_point.position_ecef_m),
-            velocity_enu_mps: enu * (velocity - true_point.velocity_ecef_mps),
+            velocity_enu_mps: velocity.map(|v| enu * (v - true_point.velocity_ecef_mps)),
             protection_m: if row.text(8).is_empty() || row.text(9).is_empty() {
                 None
             } else {
@@ -183,6 +187,7 @@ struct Accumulator {
     horizontal_squares_m2: f64,
     vertical_squares_m2: f64,
     largest_3d_m: f64,
+    velocities: u64,
     velocity_squares: Vector3<f64>,
 }
 
@@ -194,9 +199,10 @@ impl Accumulator {
         self.horizontal_squares_m2 += horizontal_m * horizontal_m;
         self.vertical_squares_m2 += p.z * p.z;
         self.largest_3d_m = self.largest_3d_m.max(p.norm());
-        self.velocity_squares += error
-            .velocity_enu_mps
-            .component_mul(&error.velocity_enu_mps);
+        if let Some(v) = &error.velocity_enu_mps {
+            self.velocities += 1;
+            self.velocity_squares += v.component_mul(v);
+        }
     }
 
     fn finish(mut self, span: &RunSpan) -> Option<ErrorStatistics> {
@@ -205,6 +211,7 @@ impl Accumulator {
         self.horizontal_m.sort_unstable_by(f32::total_cmp);
         let rank = ((0.95 * n).ceil() as usize).clamp(1, self.horizontal_m.len());
         let rms = |sum: f64| rounded((sum / n).sqrt(), 4);
+        let velocity_rms = |sum: f64| rounded((sum / self.velocities as f64).sqrt(), 4);
         // Epochs stand on a grid; half a millisecond absorbs that a clock correction may move them.
         let due = (((span.signal_s - first_s) * span.rate_hz + 5e-4).floor() + 1.0).max(n);
         Some(ErrorStatistics {
@@ -214,11 +221,11 @@ impl Accumulator {
             horizontal_max_m: rounded(f64::from(*self.horizontal_m.last()?), 4),
             vertical_rms_m: rms(self.vertical_squares_m2),
             position_3d_max_m: rounded(self.largest_3d_m, 4),
-            velocity_rms_mps: VelocityError {
-                east: rms(self.velocity_squares.x),
-                north: rms(self.velocity_squares.y),
-                up: rms(self.velocity_squares.z),
-            },
+            velocity_rms_mps: (self.velocities > 0).then(|| VelocityError {
+                east: velocity_rms(self.velocity_squares.x),
+                north: velocity_rms(self.velocity_squares.y),
+                up: velocity_rms(self.velocity_squares.z),
+            }),
         })
     }
 }
@@ -282,7 +289,9 @@ mod tests {
         {
             let mut solution = pvt(0.1 * i as f64);
             solution.position_ecef_m += enu.transpose() * Vector3::from(*offset);
-            solution.velocity_ecef_mps = enu.transpose() * Vector3::new(0.1, 0.0, 0.0);
+            if let Some(velocity) = &mut solution.velocity {
+                velocity.ecef_mps = enu.transpose() * Vector3::new(0.1, 0.0, 0.0);
+            }
             if i == 2 {
                 solution.status = Status::Unreliable;
             }
@@ -310,6 +319,6 @@ mod tests {
         );
         assert!((errors.horizontal_p95_m - 5.0).abs() < 3e-4);
         assert!((errors.vertical_rms_m - (2.0f64).sqrt()).abs() < 3e-4);
-        assert!((errors.velocity_rms_mps.east - 0.1).abs() < 1e-4);
+        assert!((errors.velocity_rms_mps.unwrap().east - 0.1).abs() < 1e-4);
     }
 }

@@ -155,6 +155,7 @@ fn run(form: Form, seed: u64) -> Result<Vec<Epoch>> {
     by_filter
         .map(|epoch| {
             let filter = epoch.pvt.filter.as_ref().context("a filter's record")?;
+            let velocity_record = epoch.pvt.velocity.context("a filter's velocity")?;
             let (position, velocity) = (epoch.position_ecef_m(), epoch.velocity_ecef_mps());
             let elapsed_s = scenario.elapsed_s(epoch.pvt.time_s);
             let bias_m = |elapsed_s| scenario.truth.clock.metres_at(elapsed_s).0;
@@ -173,7 +174,7 @@ fn run(form: Form, seed: u64) -> Result<Vec<Epoch>> {
                 position.z,
                 velocity.z,
                 SPEED_OF_LIGHT_MPS * late_s,
-                epoch.pvt.clock_drift_mps - drift_mps,
+                velocity_record.clock_drift_mps - drift_mps,
             ]);
             epoch_of(filter, &error)
         })

@@ -10,7 +10,7 @@ mod anchor;
 mod fit;
 mod hypothesis;
 
-use nalgebra::{Matrix4, Vector3};
+use nalgebra::{Matrix4, Vector3, Vector4};
 
 use crate::chi_square::chi_square_threshold;
 use crate::constants::{CA_PERIOD_M, L1_WAVELENGTH_M, SPEED_OF_LIGHT_MPS};
@@ -76,6 +76,9 @@ pub struct SnapshotSolution {
     pub solution: Solution,
     /// Standard deviation of the coarse time, s.
     pub time_sigma_s: f64,
+    /// By how much position (ECEF) and clock bias are off where the coarse time is off by that, m: the
+    /// solution's covariance holds it.
+    pub time_shift_m: Vector4<f64>,
     /// Corrected minus prior time, s.
     pub time_correction_s: f64,
     /// Satellites measured that have no valid ephemeris or whose values are not finite.
@@ -205,9 +208,12 @@ fn finish(
             Consistency::Untested
         },
     };
+    let time_sigma_s = best.covariance[(4, 4)].max(0.0).sqrt();
+    let with_time = Vector4::from_fn(|k, _| best.covariance[(k, 4)]);
     Ok(SnapshotSolution {
         solution,
-        time_sigma_s: best.covariance[(4, 4)].max(0.0).sqrt(),
+        time_sigma_s,
+        time_shift_m: with_time / time_sigma_s.max(f64::MIN_POSITIVE),
         time_correction_s: tick - prior.time,
         rejected,
     })

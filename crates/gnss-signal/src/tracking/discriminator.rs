@@ -19,6 +19,17 @@ pub struct EarlyPromptLate {
     pub late: Complex64,
 }
 
+impl EarlyPromptLate {
+    /// The sums with their phases turned by `rotor`.
+    pub(super) fn turned(&self, rotor: Complex64) -> Self {
+        Self {
+            early: self.early * rotor,
+            prompt: self.prompt * rotor,
+            late: self.late * rotor,
+        }
+    }
+}
+
 /// How a code error is formed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CodeDiscriminator {

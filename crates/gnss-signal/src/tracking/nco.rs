@@ -1,6 +1,7 @@
 //! The code and carrier oscillators of a channel, on the sample clock.
 
 use super::Spectrum;
+use super::steered::Steering;
 use crate::{FrontEnd, Replica, SignalId, TapOffsets};
 
 /// State of both oscillators at a tick.
@@ -75,6 +76,19 @@ impl Nco {
         let frequency_hz = self.front_end.intermediate_frequency_hz + self.doppler_hz;
         self.carrier_phase_cycles =
             (self.carrier_phase_cycles + frequency_hz * elapsed_s).rem_euclid(1.0);
+    }
+
+    /// Puts the code where navigation says, at its rate whatever the Doppler is; returns the shift, chips.
+    pub(super) fn steer_code(&mut self, steering: &Steering) -> f64 {
+        self.code_slip_hz = 0.0;
+        self.code_slip_hz = steering.code_rate_hz - self.code_rate_hz();
+        let since_s = (self.tick as f64 - steering.tick as f64) / self.front_end.sample_rate_hz;
+        let wanted = steering.code_phase_chips + steering.code_rate_hz * since_s;
+        let half = self.code_length_chips() / 2.0;
+        let error = wanted - self.code_phase_chips;
+        let shift = (error + half).rem_euclid(2.0 * half) - half;
+        self.shift_code(shift);
+        shift
     }
 
     /// Adds to the code phase; a whole code length is a code period.

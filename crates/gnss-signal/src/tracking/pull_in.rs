@@ -208,14 +208,8 @@ struct Blocks {
 
 impl Blocks {
     fn new(sums: &[EarlyPromptLate], edge: usize, cycles: f64) -> Self {
-        let turned = |k: usize| {
-            let rotor = Complex64::from_polar(1.0, -TAU * cycles * k as f64);
-            EarlyPromptLate {
-                early: sums[k].early * rotor,
-                prompt: sums[k].prompt * rotor,
-                late: sums[k].late * rotor,
-            }
-        };
+        let turned =
+            |k: usize| sums[k].turned(Complex64::from_polar(1.0, -TAU * cycles * k as f64));
         let add = |from: usize, to: usize| {
             let zero = Complex64::default();
             (from..to).map(turned).fold((zero, zero, zero), |s, t| {

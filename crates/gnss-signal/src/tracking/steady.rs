@@ -123,16 +123,29 @@ impl Steady {
         settings: TrackingSettings,
         periods_into_bit: u8,
     ) -> Self {
-        let bit_periods = bit_periods(&nco);
         let bit_edge = nco.code_period - i64::from(periods_into_bit);
         // Periods are counted from a bit's beginning, and never below zero.
-        nco.code_period += bit_periods;
-        let steered = Steered::new(Presence::absent());
+        nco.code_period += bit_periods(&nco);
+        Self::steered(nco, settings, bit_edge, Presence::absent())
+    }
+
+    /// Tracking of a signal that navigation steers, `bit_edge` a period that begins a bit.
+    pub(super) fn steered(
+        nco: Nco,
+        settings: TrackingSettings,
+        bit_edge: i64,
+        presence: Presence,
+    ) -> Self {
+        let lock = if presence.is_present() {
+            Lock::Code
+        } else {
+            Lock::Lost
+        };
         Self {
-            bit_edge: bit_edge.rem_euclid(bit_periods),
-            helm: Helm::Navigation(Box::new(steered)),
-            lock: Lock::Lost,
-            ..Self::new(nco, settings, 0.0, 1.0)
+            bit_edge: bit_edge.rem_euclid(bit_periods(&nco)),
+            helm: Helm::Navigation(Box::new(Steered::new(presence))),
+            lock,
+            ..Self::new(nco, settings, presence.cn0_hz(), 1.0)
         }
     }
 
@@ -168,15 +181,7 @@ impl Steady {
         if astray {
             self.detector.unlock();
         }
-        self.nco.code_slip_hz = 0.0;
-        self.nco.code_slip_hz = steering.code_rate_hz - self.nco.code_rate_hz();
-        let since_s =
-            (self.nco.tick as f64 - steering.tick as f64) / self.nco.front_end.sample_rate_hz;
-        let wanted = steering.code_phase_chips + steering.code_rate_hz * since_s;
-        let half = self.nco.code_length_chips() / 2.0;
-        let error = wanted - self.nco.code_phase_chips;
-        let shift = (error + half).rem_euclid(2.0 * half) - half;
-        self.nco.shift_code(shift);
+        let shift = self.nco.steer_code(steering);
         if let Helm::Own(_) = self.helm {
             let presence = Presence::known(self.cn0_hz);
             self.helm = Helm::Navigation(Box::new(Steered::new(presence)));

@@ -20,14 +20,7 @@ impl<B: CorrelatorBank> Run<'_, B> {
         for (satellite, kind) in self.follow_shapes() {
             self.emit(now, Some(satellite), kind)?;
         }
-        let mut tracked: Vec<Tracked> = self
-            .slots
-            .iter_mut()
-            .filter_map(|slot| {
-                let epoch = slot.channel.epoch(now)?;
-                Some(Tracked { slot, epoch })
-            })
-            .collect();
+        let mut tracked = tracked(now, &mut self.slots);
         let navigated = self.navigator.navigate(now, &mut tracked);
         let observations = report::observations(time_s, &mut tracked, &navigated);
         if let Some(observations) = observations {
@@ -97,4 +90,13 @@ impl<B: CorrelatorBank> Run<'_, B> {
         }
         Ok(())
     }
+}
+
+/// The channels that have something to say at `now`.
+pub(super) fn tracked(now: u64, slots: &mut [Slot]) -> Vec<Tracked<'_>> {
+    let said = slots.iter_mut().filter_map(|slot| {
+        let epoch = slot.channel.epoch(now)?;
+        Some(Tracked { slot, epoch })
+    });
+    said.collect()
 }

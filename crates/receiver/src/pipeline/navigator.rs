@@ -1,7 +1,7 @@
 //! From the channels' epochs to position, velocity and time.
 
 use gnss_nav::atmosphere::Klobuchar;
-use gnss_nav::coarse_time::{self, Prior, SnapshotMeasurement};
+use gnss_nav::coarse_time::{self, Prior, SnapshotMeasurement, SnapshotSolution};
 use gnss_nav::constants::{L1_HZ, L1_WAVELENGTH_M, SPEED_OF_LIGHT_MPS};
 use gnss_nav::filter::Disposition;
 use gnss_nav::least_squares::{self, Consistency, Solution};
@@ -161,6 +161,12 @@ impl Navigator {
         Some(clock.at(tick))
     }
 
+    /// Reading of the receiver's clock at `tick`, where that is known only roughly.
+    pub(super) fn coarse_time(&self, tick: u64) -> Option<GpsTime> {
+        let clock = self.clock.filter(|c| c.trust == ClockTrust::Coarse)?;
+        Some(clock.at(tick))
+    }
+
     /// Whether there is an ephemeris of `satellite` for now.
     pub(super) fn knows(&self, satellite: SatelliteId) -> bool {
         let near = self.near;
@@ -235,12 +241,11 @@ impl Navigator {
         self.set_clock_by_message(tick, tracked);
         let trust = self.clock.map(|c| c.trust);
         if trust == Some(ClockTrust::Coarse) {
-            if let Some((solution, time_sigma_s)) = self.snapshot(tick, tracked) {
-                self.settle(tick, &solution);
-                if time_sigma_s < BIT_SAFE_SIGMA_S {
+            if let Some(found) = self.snapshot(tick, tracked) {
+                if found.time_sigma_s < BIT_SAFE_SIGMA_S {
                     self.set_clock_by_bits(tick, tracked);
                 }
-                return self.result(tick, tracked, Some((solution, Source::Snapshot)));
+                return self.result(tick, tracked, Some((found.solution, Source::Snapshot)));
             }
             return self.result(tick, tracked, None);
         }
@@ -337,9 +342,10 @@ impl Navigator {
         }
     }
 
-    /// Position and time from code phases and Dopplers alone, and the deviation of the time, s.
-    fn snapshot(&self, tick: u64, tracked: &[Tracked]) -> Option<(Solution, f64)> {
-        let clock = self.clock?;
+    /// Position and time from code phases and Dopplers alone, where time is known only roughly; the next
+    /// one begins from there.
+    pub(super) fn snapshot(&mut self, tick: u64, tracked: &[Tracked]) -> Option<SnapshotSolution> {
+        let clock = self.clock.filter(|c| c.trust == ClockTrust::Coarse)?;
         let measurements: Vec<_> = tracked
             .iter()
             .map(|t| SnapshotMeasurement {
@@ -358,7 +364,9 @@ impl Navigator {
             &self.model(),
             EXCLUSION_FALSE_ALARM,
         );
-        solved.ok().map(|s| (s.solution, s.time_sigma_s))
+        let found = solved.ok()?;
+        self.settle(tick, &found.solution);
+        Some(found)
     }
 
     /// Once a coarse-time solution is good to a few milliseconds, the bit boundaries, which leave

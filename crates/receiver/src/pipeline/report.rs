@@ -6,7 +6,7 @@ use gnss_nav::geodesy::Geodetic;
 use gnss_nav::least_squares::Solution;
 use gnss_nav::{NavState, RawMeasurement, SatelliteId, chi_square_threshold};
 use gnss_signal::tracking::{ChannelEpoch, Lock};
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Matrix3;
 
 use super::belief::Said;
 use super::navigator::{Navigated, Tracked, is_contradictory};
@@ -14,7 +14,7 @@ use super::shape::{self, ShapeWatch};
 use super::slot::Slot;
 use crate::record::{
     CarrierPhase, ChannelRecord, Disposition, InnovationRecord, LoopMembership, Observation,
-    ObservationEpoch, PvtRecord, ScoreRecord, Source, Status, TrackingRecord,
+    ObservationEpoch, PvtRecord, ScoreRecord, Source, Status, TrackingRecord, VelocityRecord,
 };
 
 /// The solution as a record.
@@ -23,23 +23,25 @@ pub(crate) fn pvt(time_s: f64, solution: &Solution, source: Source) -> PvtRecord
     let to_enu = geodetic.enu_from_ecef();
     let position_covariance: Matrix3<f64> = solution.covariance_m2.fixed_view::<3, 3>(0, 0).into();
     let enu = to_enu * position_covariance * to_enu.transpose();
-    let velocity = solution.velocity.as_ref();
-    let velocity_variance = velocity.map_or(f64::INFINITY, |v| {
-        v.covariance_m2_s2.fixed_view::<3, 3>(0, 0).trace()
+    let velocity = solution.velocity.map(|v| {
+        let variance = v.covariance_m2_s2.fixed_view::<3, 3>(0, 0).trace();
+        VelocityRecord {
+            ecef_mps: v.velocity_ecef_mps,
+            clock_drift_mps: v.clock_drift_mps,
+            sigma_mps: variance.sqrt(),
+        }
     });
     PvtRecord {
         time_s,
         time: solution.gps_time(),
         position_ecef_m: solution.position_ecef_m,
-        velocity_ecef_mps: velocity.map_or_else(Vector3::zeros, |v| v.velocity_ecef_mps),
+        velocity,
         clock_bias_m: solution.clock_bias_m,
-        clock_drift_mps: velocity.map_or(0.0, |v| v.clock_drift_mps),
         satellites_used: solution.satellites.len(),
         pdop: solution.dops.pdop,
         source,
         sigma_enu_m: [enu[(0, 0)].sqrt(), enu[(1, 1)].sqrt(), enu[(2, 2)].sqrt()],
         position_covariance_ecef_m2: position_covariance,
-        sigma_velocity_mps: velocity_variance.sqrt(),
         horizontal_protection_m: None,
         vertical_protection_m: None,
         filter: None,
@@ -66,15 +68,17 @@ pub(crate) fn filtered(
         time_s,
         time: state.time,
         position_ecef_m: state.position_ecef_m,
-        velocity_ecef_mps: state.velocity_ecef_mps,
+        velocity: Some(VelocityRecord {
+            ecef_mps: state.velocity_ecef_mps,
+            clock_drift_mps: state.clock_drift_mps,
+            sigma_mps: block(covariance, 1).trace().sqrt(),
+        }),
         clock_bias_m: state.clock_bias_m,
-        clock_drift_mps: state.clock_drift_mps,
         satellites_used: 0,
         pdop: f64::INFINITY,
         source: Source::Filter,
         sigma_enu_m: [enu[(0, 0)].sqrt(), enu[(1, 1)].sqrt(), enu[(2, 2)].sqrt()],
         position_covariance_ecef_m2: position_covariance,
-        sigma_velocity_mps: block(covariance, 1).trace().sqrt(),
         horizontal_protection_m: None,
         vertical_protection_m: None,
         status,

@@ -132,8 +132,11 @@ impl<B: CorrelatorBank> Run<'_, B> {
             let due = now == next_epoch || (ended && epoch == 1);
             if self.vector.is_some() {
                 self.navigate_by_filter(now, due)?;
-            } else if due {
-                self.navigate(now)?;
+            } else {
+                if due {
+                    self.navigate(now)?;
+                }
+                self.consider_early_tracking(now)?;
             }
             if ended {
                 self.announce_rest(now)?;

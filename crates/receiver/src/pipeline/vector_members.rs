@@ -10,7 +10,7 @@ use gnss_signal::{CorrelatorBank, SignalId};
 
 use super::run::Run;
 use super::slot::Slot;
-use super::vector::VectorTracking;
+use super::vector::{Time, VectorTracking};
 use super::vector_mode::surroundings;
 use crate::ReceiverError;
 use crate::record::EventKind;
@@ -38,7 +38,7 @@ impl<B: CorrelatorBank> Run<'_, B> {
             return Ok(());
         }
         self.next_look_s = now_s + LOOK_PERIOD_S;
-        let Some(around) = surroundings(&self.navigator, now) else {
+        let Some(around) = surroundings(&self.navigator, now, Time::Exact) else {
             return Ok(());
         };
         let signals = self.settings.signals.iter();

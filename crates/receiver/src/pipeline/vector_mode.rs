@@ -1,16 +1,21 @@
 //! From scalar to vector tracking and back, and the epochs between.
 
+use gnss_nav::least_squares::{Consistency, Solution};
 use gnss_signal::CorrelatorBank;
 
+use super::fixes::tracked;
 use super::navigator::{Navigated, Navigator, Tracked};
 use super::report;
 use super::run::{Fixed, Run};
-use super::vector::{self, Outlook, Surroundings, VectorTracking};
+use super::vector::{self, Outlook, Surroundings, Time, VectorTracking};
 use crate::ReceiverError;
 use crate::record::{ChannelRecord, EventKind, LoopMembership, Record};
 
 /// Successive consistent fixes before the filter takes over: one may agree by chance.
 const FIXES_TO_SWITCH: u32 = 3;
+/// Range rates of a snapshot that fit one velocity miss it by less, m/s; those of an inverted spectrum by
+/// hundreds.
+const RATE_AGREEMENT_MPS: f64 = 10.0;
 /// Deviation of the code phase when channels get their own loops back, chips.
 const RELEASED_SIGMA_CHIPS: f64 = 0.1;
 
@@ -33,7 +38,7 @@ impl<B: CorrelatorBank> Run<'_, B> {
         if self.consistent_fixes < FIXES_TO_SWITCH {
             return Ok(());
         }
-        let Some(around) = surroundings(&self.navigator, now) else {
+        let Some(around) = surroundings(&self.navigator, now, Time::Exact) else {
             return Ok(());
         };
         let model = self.navigator.model();
@@ -43,7 +48,50 @@ impl<B: CorrelatorBank> Run<'_, B> {
             self.consistent_fixes = 0;
             return Ok(());
         };
-        tracking.steer(&around, &[], &mut self.slots);
+        self.take_helm(now, tracking, Time::Exact)
+    }
+
+    /// Begins vector tracking before any bit boundary is known, by a snapshot that agrees with itself.
+    pub(super) fn consider_early_tracking(&mut self, now: u64) -> Result<(), ReceiverError> {
+        let Some(settings) = &self.settings.vector else {
+            return Ok(());
+        };
+        let waits = self.vector.is_none() && self.navigator.coarse_time(now).is_some();
+        if !waits || self.slots.iter().any(|slot| slot.bits_found) {
+            return Ok(());
+        }
+        let tracked = tracked(now, &mut self.slots);
+        let found = self.navigator.snapshot(now, &tracked);
+        let found = found.filter(|found| agrees(&found.solution));
+        let around = surroundings(&self.navigator, now, Time::Coarse);
+        let (Some(found), Some(around)) = (found, around) else {
+            return Ok(());
+        };
+        let epochs: Vec<_> = tracked
+            .iter()
+            .map(|t| (t.slot.satellite, t.epoch))
+            .collect();
+        let model = self.navigator.model();
+        let monitors = self.monitors.clone();
+        let started =
+            VectorTracking::start_early(&around, &found, &epochs, model, settings, monitors);
+        let Some(tracking) = where_numbers_allow(started)? else {
+            return Ok(());
+        };
+        self.take_helm(now, tracking, Time::Coarse)?;
+        self.report_fix(now, Fixed::Now)
+    }
+
+    /// Steers all channels from here on.
+    fn take_helm(
+        &mut self,
+        now: u64,
+        tracking: VectorTracking,
+        time: Time,
+    ) -> Result<(), ReceiverError> {
+        if let Some(around) = surroundings(&self.navigator, now, time) {
+            tracking.steer(&around, &[], &mut self.slots);
+        }
         self.vector = Some(tracking);
         let to = LoopMembership::Vector;
         self.emit(now, None, EventKind::ModeSwitched { to })
@@ -60,7 +108,7 @@ impl<B: CorrelatorBank> Run<'_, B> {
             self.vector = Some(tracking);
             return Ok(());
         }
-        let Some(around) = surroundings(&self.navigator, now) else {
+        let Some(around) = surroundings(&self.navigator, now, tracking.time()) else {
             return self.leave_vector_tracking(now);
         };
         let model = self.navigator.model();
@@ -87,6 +135,7 @@ impl<B: CorrelatorBank> Run<'_, B> {
         self.vector = Some(tracking);
         match outlook {
             Outlook::Goes => Ok(()),
+            Outlook::Exact => self.leave_vector_tracking(now),
             Outlook::Lost => {
                 self.leave_vector_tracking(now)?;
                 self.abandon_channels(now)
@@ -176,11 +225,31 @@ fn where_numbers_allow<T>(result: Result<T, ReceiverError>) -> Result<Option<T>,
     }
 }
 
-/// What the channels of an epoch share; `None` before the clock is exact.
-pub(super) fn surroundings(navigator: &Navigator, tick: u64) -> Option<Surroundings<'_>> {
+/// Whether code phases and Dopplers of a snapshot fit one position and one velocity.
+fn agrees(solution: &Solution) -> bool {
+    let misses = |residual_mps: f64| residual_mps.abs() > RATE_AGREEMENT_MPS;
+    let mut residuals = solution
+        .satellites
+        .iter()
+        .filter_map(|s| s.range_rate_residual_mps);
+    solution.consistency == Consistency::Passed
+        && solution.velocity.is_some()
+        && !residuals.any(misses)
+}
+
+/// What the channels of an epoch share; `None` where the clock is not known so.
+pub(super) fn surroundings(
+    navigator: &Navigator,
+    tick: u64,
+    time: Time,
+) -> Option<Surroundings<'_>> {
+    let receive_time = match time {
+        Time::Exact => navigator.receive_time(tick),
+        Time::Coarse => navigator.coarse_time(tick),
+    };
     Some(Surroundings {
         tick,
-        receive_time: navigator.receive_time(tick)?,
+        receive_time: receive_time?,
         store: &navigator.store,
     })
 }

@@ -9,7 +9,7 @@ use nalgebra::{Matrix4, Vector4};
 use super::EventSink;
 use super::calendar::{Calendar, leap_seconds, on_grid};
 use super::file::OutputFile;
-use super::text::Fixed;
+use super::text::{Fixed, optional};
 use crate::ReceiverError;
 use crate::record::{Disposition, Observation, PvtRecord, Record, Status};
 
@@ -99,7 +99,8 @@ struct Moment {
     latitude: String,
     longitude: String,
     height_m: f64,
-    velocity_enu_mps: [f64; 3],
+    /// Speed over ground, knots, and course, degrees; `None` where no velocity is known.
+    motion: Option<(f64, f64)>,
 }
 
 impl Moment {
@@ -108,14 +109,19 @@ impl Moment {
         let utc: GpsTime = on_grid(pvt.time - leap, 2);
         let c = Calendar::of(utc);
         let place = Geodetic::from_ecef(&pvt.position_ecef_m);
-        let velocity = place.enu_from_ecef() * pvt.velocity_ecef_mps;
+        let motion = pvt.velocity.map(|velocity| {
+            const KNOTS_PER_MPS: f64 = 3600.0 / 1852.0;
+            let v = place.enu_from_ecef() * velocity.ecef_mps;
+            let course_deg = v.x.atan2(v.y).to_degrees().rem_euclid(360.0);
+            (v.x.hypot(v.y) * KNOTS_PER_MPS, course_deg)
+        });
         Self {
             time: format!("{:02}{:02}{:05.2}", c.hour, c.minute, c.seconds()),
             date: format!("{:02}{:02}{:02}", c.day, c.month, c.year % 100),
             latitude: angle(place.lat_rad.to_degrees(), 2, ['N', 'S']),
             longitude: angle(place.lon_rad.to_degrees(), 3, ['E', 'W']),
             height_m: place.height_m,
-            velocity_enu_mps: [velocity.x, velocity.y, velocity.z],
+            motion,
         }
     }
 
@@ -137,21 +143,18 @@ impl Moment {
     }
 
     fn rmc(&self, pvt: &PvtRecord) -> String {
-        const KNOTS_PER_MPS: f64 = 3600.0 / 1852.0;
         let (validity, mode) = match pvt.status {
             Status::Fix => ('A', 'A'),
             Status::Predicted => ('A', 'E'),
             Status::Unreliable => ('V', 'N'),
         };
-        let [east, north, _] = self.velocity_enu_mps;
-        let course_deg = east.atan2(north).to_degrees().rem_euclid(360.0);
         format!(
             "GPRMC,{},{validity},{},{},{},{},{},,,{mode}",
             self.time,
             self.latitude,
             self.longitude,
-            Fixed(east.hypot(north) * KNOTS_PER_MPS, 3),
-            Fixed(course_deg, 1),
+            optional(self.motion.map(|m| m.0), 3),
+            optional(self.motion.map(|m| m.1), 1),
             self.date,
         )
     }

@@ -7,7 +7,7 @@ use super::calendar::on_grid;
 use super::file::OutputFile;
 use super::text::{Fixed, optional};
 use crate::ReceiverError;
-use crate::record::{PvtRecord, Record};
+use crate::record::{PvtRecord, Record, VelocityRecord};
 use gnss_nav::geodesy::Geodetic;
 
 /// Name of the file.
@@ -37,7 +37,10 @@ impl PvtCsv {
     fn solution(&mut self, pvt: &PvtRecord) -> Result<(), ReceiverError> {
         let time = on_grid(pvt.time, 9);
         let place = Geodetic::from_ecef(&pvt.position_ecef_m);
-        let (p, v) = (&pvt.position_ecef_m, &pvt.velocity_ecef_mps);
+        let p = &pvt.position_ecef_m;
+        let velocity = |component: fn(&VelocityRecord) -> f64, decimals| {
+            optional(pvt.velocity.as_ref().map(component), decimals)
+        };
         let [e, n, u] = pvt.sigma_enu_m;
         write!(
             self.file,
@@ -51,22 +54,22 @@ impl PvtCsv {
             Fixed(p.x, 4),
             Fixed(p.y, 4),
             Fixed(p.z, 4),
-            Fixed(v.x, 5),
-            Fixed(v.y, 5),
-            Fixed(v.z, 5),
+            velocity(|v| v.ecef_mps.x, 5),
+            velocity(|v| v.ecef_mps.y, 5),
+            velocity(|v| v.ecef_mps.z, 5),
         )?;
         writeln!(
             self.file,
             "{},{},{},{},{},{},{},{},{},{},{},{}",
             Fixed(pvt.clock_bias_m, 4),
-            Fixed(pvt.clock_drift_mps, 5),
+            velocity(|v| v.clock_drift_mps, 5),
             pvt.satellites_used,
             Fixed(pvt.pdop, 3),
             pvt.source.name(),
             Fixed(e, 3),
             Fixed(n, 3),
             Fixed(u, 3),
-            Fixed(pvt.sigma_velocity_mps, 4),
+            velocity(|v| v.sigma_mps, 4),
             optional(pvt.horizontal_protection_m, 3),
             optional(pvt.vertical_protection_m, 3),
             pvt.status.name(),

@@ -6,7 +6,7 @@ use num_complex::Complex64;
 
 use crate::record::{
     CarrierPhase, ChannelRecord, Disposition, Lock, LoopMembership, Observation, ObservationEpoch,
-    PvtRecord, Source, Status, TrackingRecord,
+    PvtRecord, Source, Status, TrackingRecord, VelocityRecord,
 };
 use gnss_nav::geodesy::Geodetic;
 
@@ -24,15 +24,17 @@ pub(crate) fn pvt(time_s: f64) -> PvtRecord {
         time_s,
         time: start() + time_s,
         position_ecef_m: place().to_ecef(),
-        velocity_ecef_mps: Vector3::new(0.01, -0.02, 0.03),
+        velocity: Some(VelocityRecord {
+            ecef_mps: Vector3::new(0.01, -0.02, 0.03),
+            clock_drift_mps: 0.25,
+            sigma_mps: 0.05,
+        }),
         clock_bias_m: 1234.5,
-        clock_drift_mps: 0.25,
         satellites_used: 9,
         pdop: 1.9,
         source: Source::LeastSquares,
         sigma_enu_m: [0.5, 0.6, 1.1],
         position_covariance_ecef_m2: Matrix3::identity(),
-        sigma_velocity_mps: 0.05,
         horizontal_protection_m: None,
         vertical_protection_m: None,
         status: Status::Fix,

@@ -1,4 +1,4 @@
-//! The two reflections on samples, through the whole receiver set as the paper's.
+//! The two reflections on samples of one satellite, as in the paper, through the whole receiver set as the paper's.
 
 use anyhow::Result;
 use fault_ml::shape::{ChartSettings, EwmaChart, SHAPE_TAPS_CHIPS, largest_tap};
@@ -32,7 +32,9 @@ pub fn runs(seeds: usize) -> Result<Vec<Run>> {
 }
 
 fn run(seed: u64) -> Result<Run> {
-    let scenario = Scenario::new(&catalogue::find("zhang2014-multipath")?, Some(seed))?;
+    let file = catalogue::find("zhang2014-multipath")?;
+    let alone = format!("constellation.satellites=[{PRN}]");
+    let scenario = Scenario::new(&file.with(&[alone])?, Some(seed))?;
     let source = Synthesiser::new(scenario.scene())?;
     let bank = IfCorrelatorBank::new(source, HISTORY_S, InstructionSet::detect())?;
     let settings = Settings {

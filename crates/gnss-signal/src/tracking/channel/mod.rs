@@ -1,16 +1,17 @@
 //! One channel: from an acquisition to bits and epochs, interval by interval.
 
+mod open_loop;
 #[cfg(test)]
 mod tests;
 
 use super::epoch::ChannelEpoch;
 use super::nco::Nco;
-use super::pull_in::{PullInEstimate, Stretch};
 use super::sample_grid::{early_prompt_late, with_taps};
 use super::steady::Steady;
 use super::steered::{BitsLate, Steering};
-use super::{Lock, NoiseFloor, TrackingSettings, cn0};
-use crate::{AcquisitionHit, FrontEnd, Replica, SignalId, TapOffsets, Taps};
+use super::{Lock, NoiseFloor, TrackingSettings};
+use crate::{AcquisitionHit, FrontEnd, Replica, SignalId, Taps};
+use open_loop::{Outlook, PullIn};
 
 /// A data bit.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -61,21 +62,6 @@ enum Stage {
     Lost(SignalId, f64),
 }
 
-/// Open-loop correlation from a fixed start.
-#[derive(Debug, Clone)]
-struct PullIn {
-    start: Nco,
-    nco: Nco,
-    stretch: Stretch,
-}
-
-/// Fewest periods of a stretch: two whole bits, whose code phases can be compared.
-const LEAST_PERIODS: usize = 60;
-/// Periods between two looks at the stretch.
-const LOOK_PERIODS: usize = 20;
-/// Periods before the power of a stretch is judged.
-const JUDGE_PERIODS: usize = 400;
-
 impl Channel {
     /// A channel on the signal of `hit`.
     #[must_use]
@@ -101,11 +87,7 @@ impl Channel {
         Self {
             settings,
             sample_rate_hz: front_end.sample_rate_hz,
-            stage: Stage::PullIn(Box::new(PullIn {
-                start,
-                nco: start,
-                stretch: Stretch::default(),
-            })),
+            stage: Stage::PullIn(Box::new(PullIn::new(start))),
         }
     }
 
@@ -152,11 +134,27 @@ impl Channel {
         true
     }
 
+    /// As [`Self::steer`], and before the bit boundaries are known too. The channel then measures over
+    /// code periods until it is released, and goes on from there, not from its first sample.
+    pub fn steer_early(&mut self, steering: &Steering) -> bool {
+        if let Stage::PullIn(pull_in) = &mut self.stage {
+            pull_in.steer(steering);
+            return true;
+        }
+        self.steer(steering)
+    }
+
     /// Gives the oscillators back to the channel's own loops, the code phase known to
     /// `code_variance_chips2`.
     pub fn release(&mut self, code_variance_chips2: f64) {
-        if let Stage::Steady(steady) = &mut self.stage {
-            steady.release(code_variance_chips2);
+        match &mut self.stage {
+            Stage::PullIn(pull_in) => {
+                if let Some(steady) = pull_in.release(self.settings, code_variance_chips2) {
+                    self.stage = Stage::Steady(Box::new(steady));
+                }
+            }
+            Stage::Steady(steady) => steady.release(code_variance_chips2),
+            Stage::Lost(..) => {}
         }
     }
 
@@ -173,7 +171,11 @@ impl Channel {
     /// Whether navigation steers.
     #[must_use]
     pub fn is_steered(&self) -> bool {
-        matches!(&self.stage, Stage::Steady(s) if s.is_steered())
+        match &self.stage {
+            Stage::PullIn(p) => p.is_steered(),
+            Stage::Steady(s) => s.is_steered(),
+            Stage::Lost(..) => false,
+        }
     }
 
     /// The signal.
@@ -246,9 +248,7 @@ impl Channel {
         match &self.stage {
             Stage::PullIn(p) => {
                 let spacing = self.settings.spacing_chips;
-                let taps = TapOffsets::early_prompt_late(spacing);
-                let end = p.nco.tick_of_period(p.nco.nearest_period() + 1);
-                let replica = p.nco.replica(end, taps);
+                let replica = p.replica(&self.settings);
                 Some(with_taps(replica, spacing, self.sample_rate_hz))
             }
             Stage::Steady(s) => Some(s.replica()),
@@ -265,9 +265,25 @@ impl Channel {
         let variance = noise.variance(taps);
         match &mut self.stage {
             Stage::PullIn(p) => {
-                p.stretch.push(sums, variance);
-                p.nco.advance_to(replica.end_tick);
-                self.look_at_stretch()
+                p.push(sums, variance, replica.end_tick);
+                match p.look(&self.settings) {
+                    Outlook::Goes => ChannelUpdate::default(),
+                    Outlook::Lost => {
+                        self.stage = Stage::Lost(p.nco.signal, p.nco.doppler_hz);
+                        ChannelUpdate::default()
+                    }
+                    Outlook::Synced(sync) => ChannelUpdate {
+                        bit: None,
+                        bit_sync: Some(sync),
+                    },
+                    Outlook::Found(steady, sync) => {
+                        self.stage = Stage::Steady(steady);
+                        ChannelUpdate {
+                            bit: None,
+                            bit_sync: Some(sync),
+                        }
+                    }
+                }
             }
             Stage::Steady(s) => {
                 let bit = s.update(&sums, variance, replica);
@@ -284,37 +300,6 @@ impl Channel {
         }
     }
 
-    /// Moves on from pull-in where the stretch allows, or gives the signal up.
-    fn look_at_stretch(&mut self) -> ChannelUpdate {
-        let Stage::PullIn(p) = &mut self.stage else {
-            return ChannelUpdate::default();
-        };
-        let periods = p.stretch.len();
-        if periods < LEAST_PERIODS || periods % LOOK_PERIODS != 0 {
-            return ChannelUpdate::default();
-        }
-        let lowest = cn0::ratio_hz(self.settings.lowest_cn0_dbhz);
-        let Some(found) = p.estimate(&self.settings).filter(|f| f.cn0_hz > lowest) else {
-            if periods >= JUDGE_PERIODS {
-                self.stage = Stage::Lost(p.nco.signal, p.nco.doppler_hz);
-            }
-            return ChannelUpdate::default();
-        };
-        if found.bit_edge.is_some() {
-            let steady = p.steady(&found, self.settings);
-            let sync = p.bit_sync(&found, self.settings.spacing_chips);
-            self.stage = Stage::Steady(Box::new(steady));
-            return ChannelUpdate {
-                bit: None,
-                bit_sync: Some(sync),
-            };
-        }
-        if periods >= self.settings.longest_pull_in_periods as usize {
-            p.restart(&found);
-        }
-        ChannelUpdate::default()
-    }
-
     /// Combines what has come since the previous epoch into one value at `tick`.
     ///
     /// In pull-in that is the estimate of the stretch so far; `None` where there is none, or the
@@ -326,114 +311,4 @@ impl Channel {
             Stage::Lost(..) => None,
         }
     }
-}
-
-impl PullIn {
-    fn period_s(&self) -> f64 {
-        self.start.signal.spec().code_period_s()
-    }
-
-    fn estimate(&self, settings: &TrackingSettings) -> Option<PullInEstimate> {
-        self.stretch
-            .estimate(self.period_s(), settings.spacing_chips)
-    }
-
-    /// The oscillators at the start, corrected by the estimate.
-    ///
-    /// The open-loop replica ran at another code rate: the code offset holds in the middle.
-    fn corrected_start(&self, found: &PullInEstimate) -> Nco {
-        let mut nco = self.start;
-        nco.doppler_hz += found.doppler_offset_hz;
-        let slip_hz = nco.code_rate_hz() - self.start.code_rate_hz();
-        let half_s = self.stretch.len() as f64 / 2.0 * self.period_s();
-        nco.shift_code(found.code_offset_chips - slip_hz * half_s);
-        let to_start = found.doppler_offset_hz * self.period_s() / 2.0;
-        nco.carrier_phase_cycles =
-            (nco.carrier_phase_cycles + found.phase_offset_cycles - to_start).rem_euclid(1.0);
-        nco
-    }
-
-    fn steady(&self, found: &PullInEstimate, settings: TrackingSettings) -> Steady {
-        let mut nco = self.corrected_start(found);
-        let edge = self.start.nearest_period() + i64::from(found.bit_edge.unwrap_or(0));
-        if edge > nco.nearest_period() {
-            nco.advance_to(nco.tick_of_period(edge));
-        }
-        nco.doppler_cycles = 0.0;
-        let length_s = self.stretch.len() as f64 * self.period_s();
-        let variance = code_variance_chips2(found.cn0_hz, length_s, settings.spacing_chips);
-        Steady::new(nco, settings, found.cn0_hz, variance)
-    }
-
-    fn bit_sync(&self, found: &PullInEstimate, spacing_chips: f64) -> BitSync {
-        let spec = self.start.signal.spec();
-        let bit_s = f64::from(spec.code_periods_per_bit) * self.period_s();
-        let first_bits = found.whole_bits / 2;
-        let second_bits = found.whole_bits - first_bits;
-        // The halves' middles lie half the whole bits apart.
-        let apart_s = found.whole_bits as f64 * bit_s / 2.0;
-        let variance =
-            |bits: usize| code_variance_chips2(found.cn0_hz, bits as f64 * bit_s, spacing_chips);
-        let fitted_hz = self.start.spectrum.sign() * found.doppler_offset_hz;
-        BitSync {
-            doppler_hz: self.start.doppler_hz + found.doppler_offset_hz,
-            code_slip_hz: found.code_drift_chips / apart_s
-                - fitted_hz * spec.code_rate_hz / spec.carrier_hz,
-            // Infinite without a bit in either half.
-            code_slip_variance_hz2: (variance(first_bits) + variance(second_bits))
-                / (apart_s * apart_s),
-        }
-    }
-
-    /// Begins a new stretch here, at the Doppler and code phase found.
-    fn restart(&mut self, found: &PullInEstimate) {
-        let mut nco = self.corrected_start(found);
-        nco.advance_to(self.nco.tick);
-        nco.advance_to(nco.tick_of_period(nco.nearest_period() + 1));
-        self.start = nco;
-        self.nco = nco;
-        self.stretch = Stretch::default();
-    }
-
-    fn epoch(&self, tick: u64, settings: &TrackingSettings) -> Option<ChannelEpoch> {
-        let found = self.estimate(settings)?;
-        let mut nco = self.corrected_start(&found);
-        nco.advance_to(tick);
-        let cn0_hz = found.cn0_hz.max(1.0);
-        let length_s = self.stretch.len() as f64 * self.period_s();
-        let spacing = settings.spacing_chips;
-        // The bound of a frequency from a stretch (Rife1974), doubled for the unknown data.
-        let snr = cn0_hz * length_s;
-        let tau = std::f64::consts::TAU;
-        let last = self.stretch.last()?;
-        let first = self.start.nearest_period();
-        let sign = nco.spectrum.sign();
-        Some(ChannelEpoch {
-            signal: nco.signal,
-            tick,
-            code_period: nco.code_period,
-            code_phase_chips: nco.code_phase_chips,
-            periods_into_bit: found
-                .bit_edge
-                .map(|edge| (nco.code_period - i64::from(edge) - first).rem_euclid(20) as u8),
-            code_variance_chips2: code_variance_chips2(cn0_hz, length_s, spacing),
-            doppler_hz: sign * nco.doppler_hz,
-            doppler_variance_hz2: 12.0 / (tau * tau * snr * length_s * length_s),
-            doppler_age_s: 0.0,
-            doppler_cycles: sign * nco.doppler_cycles,
-            phase_slipped: true,
-            cn0_dbhz: cn0::dbhz(cn0_hz),
-            lock: Lock::PullIn,
-            prompt: last.prompt / self.stretch.noise_variance().sqrt(),
-            code_error_chips: found.code_offset_chips,
-            frequency_error_hz: found.doppler_offset_hz,
-        })
-    }
-}
-
-/// Variance of early minus late over a stretch of `length_s`, bit by bit, chips^2.
-fn code_variance_chips2(cn0_hz: f64, length_s: f64, spacing_chips: f64) -> f64 {
-    let bit_snr = cn0_hz * length_s.min(0.02);
-    let squaring = 1.0 + 2.0 / ((2.0 - spacing_chips) * bit_snr);
-    spacing_chips / (4.0 * cn0_hz * length_s) * squaring
 }

@@ -63,17 +63,22 @@ impl Run {
         }
     }
 
+    /// Tracks up to `tick`.
+    fn track(&mut self, tick: u64) {
+        let mut taps = Vec::new();
+        while let Some(replica) = self.channel.replica().filter(|r| r.end_tick <= tick) {
+            self.signal.correlate(&[replica], &mut taps).unwrap();
+            self.channel.update(&replica, &taps[0], &self.noise);
+        }
+    }
+
     /// Tracks from 0 to `end_s`; errors of code phase (chips) and Doppler (Hz) after `settled_s`.
     fn errors(&mut self, settled_s: f64, end_s: f64) -> (Tally, Tally) {
         let (mut code, mut doppler) = (Tally::default(), Tally::default());
         let fs = self.signal.front_end.sample_rate_hz;
-        let mut taps = Vec::new();
         for k in 1..=(end_s * 50.0) as u64 {
             let tick = k * (fs / 50.0) as u64;
-            while let Some(replica) = self.channel.replica().filter(|r| r.end_tick <= tick) {
-                self.signal.correlate(&[replica], &mut taps).unwrap();
-                self.channel.update(&replica, &taps[0], &self.noise);
-            }
+            self.track(tick);
             let epoch = self.channel.epoch(tick).unwrap();
             let t = tick as f64 / fs;
             if t > settled_s {
@@ -90,7 +95,7 @@ impl Run {
                 wrong * self.code_error_chips,
                 wrong * self.doppler_error_hz,
             );
-            assert!(self.channel.steer(&to));
+            assert!(self.channel.steer_early(&to));
         }
         (code, doppler)
     }
@@ -163,4 +168,54 @@ fn a_signal_that_returns_is_taken_up_at_once() {
     run.errors(0.0, 8.0);
     assert_eq!(run.channel.lock(), Lock::Lost);
     assert!(run.channel.is_steered() && run.channel.replica().is_some());
+}
+
+/// A channel fresh from acquisition, steered from the first 20 ms on.
+fn early(cn0_dbhz: f64, seed: u64) -> Run {
+    let mut run = Run::new(cn0_dbhz, seed, SteeredSettings::default());
+    let hit = run.signal.hit(0.12, 21.0);
+    let settings = TrackingSettings::default();
+    run.channel = Channel::new(&hit, run.signal.front_end, settings);
+    (run.code_error_chips, run.doppler_error_hz) = (0.02, 2.0);
+    run
+}
+
+#[test]
+fn errors_are_those_reported_before_bits_are_known() {
+    for cn0_dbhz in [45.0, 38.0] {
+        let (mut code, mut doppler) = (Tally::default(), Tally::default());
+        for seed in 0..400 {
+            let mut run = early(cn0_dbhz, seed);
+            let (c, d) = run.errors(0.02, 0.1);
+            assert_eq!(run.channel.lock(), Lock::PullIn);
+            code.join(&c);
+            doppler.join(&d);
+        }
+        let (c, d) = (code.mean_square(), doppler.mean_square());
+        // 1600 epochs: 3.5 %. Where the bits change decides how well the Doppler is known, and the weaker
+        // the signal the more.
+        assert!((0.9..1.15).contains(&c), "code {c} at {cn0_dbhz}");
+        assert!((0.7..1.5).contains(&d), "Doppler {d} at {cn0_dbhz}");
+        // Four deviations of a mean of 1600.
+        assert!((code.sum / code.count).abs() < 0.1, "{cn0_dbhz}");
+    }
+}
+
+#[test]
+fn bits_are_found_while_navigation_steers() {
+    let mut run = early(45.0, 3);
+    run.errors(0.0, 1.0);
+    assert!(run.channel.is_steered());
+    assert_eq!(run.channel.lock(), Lock::PullIn);
+    let period = |run: &mut Run, time_s: f64| {
+        let tick = (time_s * run.signal.front_end.sample_rate_hz) as u64;
+        run.track(tick);
+        run.channel.epoch(tick).unwrap().periods_into_bit
+    };
+    let expected =
+        |run: &Run, time_s| Some((run.signal.chips_at(time_s) / 1023.0).rem_euclid(20.0) as u8);
+    assert_eq!(period(&mut run, 1.02), expected(&run, 1.02));
+    run.channel.release(0.01);
+    assert_eq!(period(&mut run, 3.0), expected(&run, 3.0));
+    assert_eq!(run.channel.lock(), Lock::Carrier);
 }

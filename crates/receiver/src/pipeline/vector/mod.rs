@@ -14,6 +14,7 @@ mod watch;
 
 use std::collections::{BTreeMap, VecDeque};
 
+use gnss_nav::coarse_time::SnapshotSolution;
 use gnss_nav::filter::{
     Advice, Disposition, EpochGeometry, FaultLogic, FaultThresholds, Innovations, NavFilter,
     Observable, SatelliteInnovation, SkipReason, Update,
@@ -25,7 +26,7 @@ use gnss_nav::{
     Solution, least_squares,
 };
 use gnss_signal::tracking::{ChannelEpoch, Lock};
-use nalgebra::Vector3;
+use nalgebra::{Vector3, Vector4};
 
 use super::belief::Change;
 use super::navigator::EXCLUSION_FALSE_ALARM;
@@ -57,15 +58,28 @@ const TIME_DISAGREES_S: f64 = 0.5e-3;
 const CONTRADICTING: usize = 2;
 /// An acceleration below two deviations of its noise is none: fed back, noise would grow.
 const SIGNIFICANT_SIGMAS2: f64 = 4.0;
+/// Weak signals may take longer than this to show where their bits begin, s.
+const BITS_PATIENCE_S: f64 = 1.0;
 /// Past this deviation of a predicted range, m, a signal is likely to lie outside the taps: half a
 /// chip.
 const LOST_M: f64 = 150.0;
+
+/// How well the receiver's clock is known.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Time {
+    /// To a small part of a code period.
+    Exact,
+    /// As well as a snapshot tells: before any bit boundary is known.
+    Coarse,
+}
 
 /// What becomes of vector tracking after an epoch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Outlook {
     /// It goes on.
     Goes,
+    /// Enough bit boundaries are known for an exact time, which it begins anew with.
+    Exact,
     /// The prediction no longer reaches the signals: they have to be found again.
     Lost,
     /// Most channels contradict the filter and no solution reconciles them: not even the time is
@@ -136,8 +150,12 @@ pub(super) struct VectorTracking {
     acceleration_mps2: Vector3<f64>,
     /// The last epoch.
     pub(super) tick: u64,
+    started: GpsTime,
     /// When enough satellites for a fix were last used.
     fixed: GpsTime,
+    /// What an error of the coarse time makes of position (ECEF) and clock bias, m, one deviation; `None`
+    /// where time is exact.
+    coarse_shift_m: Option<Vector4<f64>>,
     pub(super) outlook: Outlook,
 }
 
@@ -166,10 +184,45 @@ impl VectorTracking {
             velocities: VecDeque::new(),
             acceleration_mps2: Vector3::zeros(),
             tick: around.tick,
+            started: solution.gps_time(),
             fixed: solution.gps_time(),
+            coarse_shift_m: None,
             outlook: Outlook::Goes,
             settings: settings.clone(),
         })
+    }
+
+    /// Starts from a snapshot of what channels said before their bit boundaries were known.
+    ///
+    /// # Errors
+    /// As [`Self::start`].
+    pub(super) fn start_early(
+        around: &Surroundings,
+        snapshot: &SnapshotSolution,
+        epochs: &[(SatelliteId, ChannelEpoch)],
+        model: MeasurementModel,
+        settings: &VectorSettings,
+        monitors: Vec<Monitor>,
+    ) -> Result<Self, ReceiverError> {
+        let state = NavState::from(&snapshot.solution);
+        let raw = epochs.iter().filter_map(|(satellite, epoch)| {
+            let ephemeris = around.store.select(*satellite, state.time)?;
+            let expected = state.expect(ephemeris, around.receive_time, &model).ok()?;
+            steering::raw_measurement(epoch, *satellite, around.receive_time, &expected, settings)
+        });
+        let raw: Vec<RawMeasurement> = raw.collect();
+        let started = Self::start(around, &snapshot.solution, &raw, model, settings, monitors)?;
+        Ok(Self {
+            coarse_shift_m: Some(snapshot.time_shift_m),
+            ..started
+        })
+    }
+
+    pub(super) const fn time(&self) -> Time {
+        match self.coarse_shift_m {
+            Some(_) => Time::Coarse,
+            None => Time::Exact,
+        }
     }
 
     const fn model(&self) -> &MeasurementModel {
@@ -217,6 +270,9 @@ impl VectorTracking {
         if self.contradicting >= CONTRADICTING {
             self.outlook = Outlook::Contradicted;
         }
+        if self.time() == Time::Coarse && self.bits_tell_time(slots) {
+            self.outlook = Outlook::Exact;
+        }
         let channels = slots.iter().map(|slot| &slot.channel);
         if let Some(size_m) = bit_slip::find(channels) {
             self.outlook = Outlook::Slipped;
@@ -225,6 +281,14 @@ impl VectorTracking {
         self.remember_velocity();
         self.steer(around, &epoch.members, slots);
         Ok(epoch)
+    }
+
+    /// Whether bit boundaries can take the place of the coarse time: all are known, or enough of them and
+    /// the others take long.
+    fn bits_tell_time(&self, slots: &[Slot]) -> bool {
+        let known = slots.iter().filter(|slot| slot.bits_found).count();
+        let age_s = self.state().time - self.started;
+        known >= NEEDED && (known == slots.len() || age_s > BITS_PATIENCE_S)
     }
 
     /// What a steered channel measured.

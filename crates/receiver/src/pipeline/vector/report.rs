@@ -41,7 +41,13 @@ impl VectorTracking {
     /// The estimate as a record.
     pub(in crate::pipeline) fn pvt(&self, time_s: f64, epoch: &Epoch) -> PvtRecord {
         let own = self.filter.covariance_after(epoch.age_s());
-        let covariance = self.geometry.map_or(own, |g| g.with_lasting(&own));
+        let mut covariance = self.geometry.map_or(own, |g| g.with_lasting(&own));
+        if let Some(shift) = self.coarse_shift_m {
+            let offsets = shift * shift.transpose();
+            for (row, column) in (0..4).flat_map(|row| (0..4).map(move |c| (row, c))) {
+                covariance[(2 * row, 2 * column)] += offsets[(row, column)];
+            }
+        }
         let status = if self.is_fixed() {
             Status::Fix
         } else {

@@ -6,12 +6,12 @@ use gnss_nav::{GpsTime, RawMeasurement, SatelliteId};
 use gnss_signal::tracking::{ChannelEpoch, Steering};
 
 use super::settings::{MeasurementNoise, VectorSettings};
-use super::{Member, Surroundings, VectorTracking};
+use super::{Member, Surroundings, Time, VectorTracking};
 use crate::pipeline::slot::Slot;
 
 impl VectorTracking {
-    /// Puts every channel whose bit boundaries are known where its signal is expected; of `members` it is
-    /// known where their satellites are.
+    /// Puts every channel whose bit boundaries are known, and where time is coarse every channel, where its
+    /// signal is expected; of `members` it is known where their satellites are.
     pub(in crate::pipeline) fn steer(
         &self,
         around: &Surroundings,
@@ -28,9 +28,12 @@ impl VectorTracking {
                 )),
                 None => self.expected(around, slot.satellite),
             };
-            if let Some(expected) = expected {
-                slot.channel.steer(&steering(around.tick, &expected));
-            }
+            let Some(expected) = expected else { continue };
+            let to = steering(around.tick, &expected);
+            match self.time() {
+                Time::Exact => slot.channel.steer(&to),
+                Time::Coarse => slot.channel.steer_early(&to),
+            };
         }
     }
 }

@@ -9,6 +9,10 @@ const HEIGHT: f64 = 280.0;
 const LEFT: f64 = 62.0;
 const RIGHT: f64 = 80.0;
 const TOP: f64 = 14.0;
+/// Room that the label of a mark takes, and how many rows labels that would meet are spread over.
+const MARK_WIDTH: f64 = 90.0;
+const MARK_ROW: f64 = 11.0;
+const MARK_ROWS: usize = 4;
 const BOTTOM: f64 = 40.0;
 
 /// One line of a chart.
@@ -68,8 +72,11 @@ impl Chart<'_> {
                 "<line x1=\"{LEFT}\" y1=\"{y:.1}\" x2=\"{right}\" y2=\"{y:.1}\" class=\"level\"/>"
             );
         }
-        for mark in self.marks {
-            svg += &draw_mark(&scale, mark);
+        for (k, mark) in self.marks.iter().enumerate() {
+            let near =
+                |other: &&Mark| (scale.x(other.time_s) - scale.x(mark.time_s)).abs() < MARK_WIDTH;
+            let above = self.marks[..k].iter().filter(near).count() % MARK_ROWS;
+            svg += &draw_mark(&scale, mark, above);
         }
         for line in &self.lines {
             svg += &draw_line(&scale, line);
@@ -192,7 +199,8 @@ fn points(scale: &Scale, values: impl Iterator<Item = (f64, f64)>) -> String {
     })
 }
 
-fn draw_mark(scale: &Scale, mark: &Mark) -> String {
+/// A mark whose label stands `row` rows below the top.
+fn draw_mark(scale: &Scale, mark: &Mark, row: usize) -> String {
     let x = scale.x(mark.time_s);
     if !(LEFT..=WIDTH - RIGHT).contains(&x) {
         return String::new();
@@ -202,7 +210,7 @@ fn draw_mark(scale: &Scale, mark: &Mark) -> String {
         "<line x1=\"{x:.1}\" y1=\"{TOP}\" x2=\"{x:.1}\" y2=\"{bottom}\" class=\"mark\"/>\
          <text x=\"{:.1}\" y=\"{:.1}\" class=\"marktext\">{label}</text>\n",
         x + 3.0,
-        TOP + 9.0
+        TOP + 9.0 + MARK_ROW * row as f64
     )
 }
 
