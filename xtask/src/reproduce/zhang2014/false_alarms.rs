@@ -12,9 +12,9 @@ use crate::judged::in_parallel;
 
 /// Signal strengths, dB-Hz.
 pub const CN0_DBHZ: [f64; 7] = [32.0, 35.0, 38.0, 41.0, 44.0, 47.0, 50.0];
-/// Simulated at each, h: of the monitor as the receiver has it without a filter, 308 in all, behind one, and of
+/// Simulated at each, h: of the monitor as the receiver has it without a filter, 371 in all, behind one, and of
 /// the paper's chart.
-const OPEN_HOURS: f64 = 44.0;
+const OPEN_HOURS: f64 = 53.0;
 const FILTERED_HOURS: f64 = 9.0;
 const PAPER_HOURS: f64 = 3.0;
 

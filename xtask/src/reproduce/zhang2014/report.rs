@@ -206,7 +206,7 @@ fn two_reflections(study: &Study) -> String {
         );
     }
     text + "\nSix deviations alarm by chance once in some twelve minutes of a closed loop (below): of 60 runs of 2 s before the onset 0.2 are expected to, and of the \
-            first 1200 seeds three do, one of them among the first 60. The limits of closed loops do not, and cost 40 ms.\n\nOn samples (5 MHz, 8 bits, complex) the whole receiver tracks the satellite alone with the paper's settings; the error there is that of a settled loop.\n\n"
+            first 1200 seeds three do, one of them among the first 60. The limits of closed loops do not, and cost 40 ms.\n\nOn samples (5 MHz, 8 bits, complex, no other satellite) the whole receiver tracks the satellite alone with the paper's settings; the error there is that of a settled loop.\n\n"
 }
 
 fn run_lengths(study: &Study) -> String {
@@ -306,7 +306,7 @@ fn urban(study: &Study) -> String {
     let mut text = format!(
         "## Twelve satellites, some reflected\n\n\
          {SCENARIOS} scenarios of each number, 14 epochs a second apart; skies of two nominal constellations above 15 degrees, 44 dB-Hz; amplitude 0.3 to 0.8, \
-         delay 0.1 to 1 chip, any phase, fading up to 0.3 Hz; pseudoranges err by the loop and by 1 m. Limits of closed loops, weight 1 / (s^2 + (Z / 0.65)^2), residual RAIM with \
+         delay 0.1 to 1 chip, any phase, fading up to 0.3 Hz; pseudoranges err by the loop and by 1 m. Limits of closed loops; flagged satellites are believed again after 2 s within them, as in the receiver. Weight 1 / (s^2 + (Z / 0.65)^2), residual RAIM with \
          repeated exclusion at 1e-4. 3-D rms and 95th percentile (m), the oracle's rms in brackets.\n\n| reflected |"
     );
     for way in Way::ALL {

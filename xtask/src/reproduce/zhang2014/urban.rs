@@ -29,6 +29,8 @@ pub const SCENARIOS: usize = 100;
 /// Epochs of a scenario, a second apart, after a second in which the loops settle.
 const EPOCHS: usize = 14;
 const STEPS: usize = 1_000;
+/// Steps within the limits after which a flagged satellite is believed again: the 2 s of the receiver.
+const READMIT_STEPS: usize = 2_000;
 /// C/N0 of every satellite, dB-Hz.
 const CN0_DBHZ: f64 = 44.0;
 /// Deviation of a pseudorange beside the loop's jitter, and with it, m.
@@ -146,18 +148,26 @@ struct Satellite {
     channel: Channel,
     reflection: Option<Reflection>,
     fading_hz: f64,
+    /// Steps for which it is still not believed.
+    suspended: usize,
 }
 
 impl Satellite {
-    /// A second of signal; what is seen at its end.
-    fn second(&mut self) -> Seen {
+    /// A second of signal; what is seen at its end, and whether the satellite is flagged: outside the
+    /// limits, or not yet for long enough within them.
+    fn second(&mut self) -> (Seen, bool) {
         let mut seen = self.step();
         (1..STEPS).for_each(|_| seen = self.step());
-        seen
+        (seen, self.suspended > 0)
     }
 
     fn step(&mut self) -> Seen {
         let seen = self.channel.step(self.reflection.as_slice());
+        self.suspended = if seen.is_outside() {
+            READMIT_STEPS
+        } else {
+            self.suspended.saturating_sub(1)
+        };
         if let Some(reflection) = &mut self.reflection {
             reflection.phase_rad += TAU * self.fading_hz / STEPS as f64;
         }
@@ -182,6 +192,7 @@ fn scenario(reflected: usize, seed: u64) -> Result<Vec<Epoch>> {
             channel: Channel::new(Setting::paper(CN0_DBHZ), chart, rng.random())?,
             fading_hz: rng.random_range(0.0..0.3),
             reflection,
+            suspended: 0,
         })
     };
     let mut satellites = sky
@@ -201,12 +212,12 @@ fn epoch(
     time: GpsTime,
     rng: &mut ChaCha8Rng,
 ) -> Result<Epoch> {
-    let seen: Vec<Seen> = satellites.iter_mut().map(Satellite::second).collect();
+    let seen: Vec<(Seen, bool)> = satellites.iter_mut().map(Satellite::second).collect();
     let measurements: Vec<Measurement> = satellites
         .iter()
         .zip(&seen)
         .enumerate()
-        .map(|(k, (satellite, seen))| {
+        .map(|(k, (satellite, (seen, _)))| {
             let noise: f64 = rng.sample(StandardNormal);
             Measurement {
                 satellite: SatelliteId::gps(k as u8 + 1),
@@ -225,7 +236,7 @@ fn epoch(
     let error = |way| error_m(way, &measurements, &seen, &is_reflected, place);
     let flags = |reflected: bool| {
         let both = seen.iter().zip(&is_reflected);
-        both.filter(|(s, r)| s.is_outside() && **r == reflected)
+        both.filter(|((_, flagged), r)| *flagged && **r == reflected)
             .count()
     };
     Ok(Epoch {
@@ -238,7 +249,7 @@ fn epoch(
 fn error_m(
     way: Way,
     measurements: &[Measurement],
-    seen: &[Seen],
+    seen: &[(Seen, bool)],
     is_reflected: &[bool],
     place: &Vector3<f64>,
 ) -> Result<f64> {
@@ -248,11 +259,11 @@ fn error_m(
     };
     let used = match way {
         Way::Plain | Way::Raim => measurements.to_vec(),
-        Way::Exclude | Way::Both => those(&|k| !seen[k].is_outside()),
+        Way::Exclude | Way::Both => those(&|k| !seen[k].1),
         Way::Known => those(&|k| !is_reflected[k]),
         Way::Weight => {
             let mut all = measurements.to_vec();
-            for (m, seen) in all.iter_mut().zip(seen).filter(|(_, s)| s.is_outside()) {
+            for (m, (seen, _)) in all.iter_mut().zip(seen).filter(|(_, s)| s.1) {
                 m.pseudorange_variance_m2 += (CHIP_M * seen.mean_chips / SLOPE).powi(2);
             }
             all
