@@ -62,18 +62,11 @@ fn detection(study: &Study) -> Vec<Check> {
 }
 
 fn false_alarms(study: &Study) -> Vec<Check> {
-    let [monitor, narrow, paper] = study.false_alarms.each_ref().map(|f| f.rate());
-    let name = |what: &str| format!("false alarms an hour and channel, {what}");
-    vec![
-        Check::at_most(name("monitor, no filter"), monitor.per_hour, 0.01, ""),
-        Check::at_most(name("monitor, 1.6 MHz"), narrow.per_hour, 0.01, ""),
-        Check::at_most(
-            name("chart of the largest tap, lower end"),
-            paper.low,
-            0.01,
-            "",
-        ),
-    ]
+    // The others are simulated for too short a time to tell such a rate: they are in the report.
+    let [monitor, ..] = &study.false_alarms;
+    let name = "false alarms of the monitor, no filter, an hour and channel, upper end of 95 %";
+    let upper = monitor.rate().high;
+    vec![Check::at_most(name.to_owned(), upper, 0.01, "")]
 }
 
 fn urban(study: &Study) -> Vec<Check> {
