@@ -78,20 +78,57 @@ fn a_weight_or_exclusion_keeps_the_position() {
 #[test]
 fn it_watches_beside_the_filter_as_well() {
     let scenario = scenario("zhang2014-multipath");
-    let settings = Settings {
-        vector: Some(VectorSettings {
-            monitor: None,
-            ..VectorSettings::default()
-        }),
-        ..watched(&scenario, Policy::Exclude)
-    };
-    let alarms = alarms(&receive(&scenario, Level::Correlator, &settings).unwrap());
+    let judged = receive(&scenario, Level::Correlator, &vector(&scenario, true)).unwrap();
+    let alarms = alarms(&judged);
     assert!(!alarms.is_empty());
     assert!(
         alarms
             .iter()
             .all(|(s, t)| *s == SatelliteId::gps(24) && *t > 2.0)
     );
+}
+
+/// In vector tracking, watched by the chart alone or by nobody.
+fn vector(scenario: &Scenario, chart: bool) -> Settings {
+    let watched = watched(scenario, Policy::Exclude);
+    Settings {
+        shape: watched.shape.filter(|_| chart),
+        vector: Some(VectorSettings {
+            monitor: None,
+            ..VectorSettings::default()
+        }),
+        ..watched
+    }
+}
+
+#[test]
+fn between_houses_it_keeps_the_filter_on_the_road() {
+    let scenario = scenario("urban-canyon");
+    let p95_m = |chart| {
+        let judged = receive(&scenario, Level::Correlator, &vector(&scenario, chart)).unwrap();
+        let mut errors: Vec<f64> = judged
+            .epochs
+            .iter()
+            .map(JudgedEpoch::horizontal_m)
+            .collect();
+        errors.sort_by(f64::total_cmp);
+        errors[errors.len() * 95 / 100]
+    };
+    let (with, without) = (p95_m(true), p95_m(false));
+    // 40 % below no monitor are asked for.
+    assert!(with <= 0.6 * without, "{with} of {without} m");
+}
+
+#[test]
+fn ten_minutes_under_an_open_sky_pass_without_an_alarm() {
+    let file = catalogue::find("static-open-sky").unwrap();
+    let file = file.with(&["duration_s=600".to_owned()]).unwrap();
+    let scenario = Scenario::new(&file, None).unwrap();
+    let judged = receive(&scenario, Level::Correlator, &vector(&scenario, true)).unwrap();
+    assert_eq!(alarms(&judged), []);
+    let scored = judged.channels.iter().filter(|c| !c.scores.is_empty());
+    // Eight satellites, ten times a second.
+    assert!(scored.count() > 45_000);
 }
 
 #[test]

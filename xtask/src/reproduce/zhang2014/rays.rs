@@ -6,8 +6,7 @@ use anyhow::Result;
 use fault_ml::shape::ChartSettings;
 
 use super::channel::{Channel, Seen};
-use super::closed_loop::{Reflection, Setting, settled};
-use super::correlation::Correlation;
+use super::closed_loop::{Reflection, Setting};
 use super::deviation::COMPLEX_DBHZ;
 use super::map::correlation_coefficient;
 
@@ -52,21 +51,20 @@ pub const RAYS: [Ray; 2] = [
 ];
 
 impl Ray {
-    /// Error of a loop that has settled on the reflections of `time_s`, chips late.
-    #[must_use]
-    pub fn settled_chips(time_s: f64) -> f64 {
-        let reflections: Vec<_> = RAYS.iter().filter_map(|ray| ray.at(time_s)).collect();
-        settled(&Correlation::Triangle, 1.0, &reflections).0
-    }
-
     fn at(&self, time_s: f64) -> Option<Reflection> {
         let (begin_s, end_s) = self.during_s;
-        (time_s >= begin_s && time_s < end_s).then(|| Reflection {
+        (time_s >= begin_s && time_s < end_s).then_some(Reflection {
             amplitude: self.amplitude,
             delay_chips: self.delay_chips,
             phase_rad: self.phase_rad + TAU * self.fading_hz * (time_s - begin_s),
         })
     }
+}
+
+/// The reflections of a time.
+#[must_use]
+pub fn reflections(time_s: f64) -> Vec<Reflection> {
+    RAYS.iter().filter_map(|ray| ray.at(time_s)).collect()
 }
 
 /// A run: time, s, and what was seen.
@@ -81,8 +79,7 @@ pub fn run(chart: ChartSettings, seed: u64) -> Result<Run> {
     let steps = (DURATION_S / STEP_S).round() as u32;
     let step = |k: u32| {
         let time_s = f64::from(k) * STEP_S;
-        let reflections: Vec<_> = RAYS.iter().filter_map(|ray| ray.at(time_s)).collect();
-        (time_s, channel.step(&reflections))
+        (time_s, channel.step(&reflections(time_s)))
     };
     Ok((0..steps).map(step).collect())
 }

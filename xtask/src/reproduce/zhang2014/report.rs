@@ -206,7 +206,7 @@ fn two_reflections(study: &Study) -> String {
         );
     }
     text + "\nSix deviations alarm by chance once in some twelve minutes of a closed loop (below): of 60 runs of 2 s before the onset 0.2 are expected to, and of the \
-            first 1200 seeds three do, one of them among the first 60. The limits of closed loops do not, and cost 40 ms.\n\nOn samples (5 MHz, 8 bits, complex, no other satellite) the whole receiver tracks the satellite alone with the paper's settings; the error there is that of a settled loop.\n\n"
+            first 1200 seeds three do, one of them among the first 60. The limits of closed loops do not, and cost 40 ms.\n\nOn samples (5 MHz, 8 bits, complex, no other satellite) the whole receiver tracks the satellite alone with the paper's settings; the error there is that of such a loop without noise.\n\n"
 }
 
 fn run_lengths(study: &Study) -> String {

@@ -9,7 +9,8 @@ use receiver::pipeline::{self, Settings};
 use receiver::record::{Record, TapsRecord};
 
 use super::channel::Seen;
-use super::rays::{Ray, Run};
+use super::closed_loop::{ClosedLoop, Setting};
+use super::rays::{Run, reflections};
 use crate::judged::in_parallel;
 use crate::scenario::built::Scenario;
 use crate::scenario::catalogue;
@@ -19,11 +20,13 @@ use crate::scenario::if_signal::Synthesiser;
 const HISTORY_S: f64 = 2.0;
 /// The satellite with the reflections in the scenario.
 const PRN: u8 = 24;
+/// C/N0 at which a loop has no noise to speak of, dB-Hz.
+const NOISELESS_DBHZ: f64 = 120.0;
 /// The loop is settled from here on, s.
 const SETTLED_S: f64 = 1.5;
 
 /// Runs of `seeds` scenarios: the chart over the sums of the receiver's channel, beside the error of a
-/// settled loop.
+/// loop without noise.
 ///
 /// # Errors
 /// Where a signal cannot be made or received.
@@ -50,27 +53,33 @@ fn run(seed: u64) -> Result<Run> {
         ..Settings::default()
     };
     let mut chart = EwmaChart::new(ChartSettings::default())?;
+    let mut noiseless = ClosedLoop::new(Setting::paper(NOISELESS_DBHZ), 0);
     let mut run = Run::new();
     pipeline::run(bank, &settings, &mut |record| {
         if let Record::Taps(taps) = record
             && taps.satellite == SatelliteId::gps(PRN)
         {
-            run.extend(step(&taps, &mut chart));
+            run.extend(step(&taps, &mut chart, &mut noiseless));
         }
         Ok(())
     })?;
     Ok(run)
 }
 
-fn step(taps: &TapsRecord, chart: &mut EwmaChart) -> Option<(f64, Seen)> {
+fn step(
+    taps: &TapsRecord,
+    chart: &mut EwmaChart,
+    noiseless: &mut ClosedLoop,
+) -> Option<(f64, Seen)> {
     let settled = taps.time_s > SETTLED_S && taps.offsets_chips.ends_with(&SHAPE_TAPS_CHIPS);
     let sums = taps.sums.last_chunk::<9>().filter(|_| settled)?;
     let observed_chips = largest_tap(&SHAPE_TAPS_CHIPS, &sums.map(|s| s.norm()))?;
+    noiseless.step(&reflections(taps.time_s));
     let seen = Seen {
         observed_chips,
         mean_chips: chart.step(observed_chips),
         limit_chips: chart.limit(),
-        late_chips: Ray::settled_chips(taps.time_s),
+        late_chips: noiseless.late_chips(),
     };
     Some((taps.time_s, seen))
 }
