@@ -51,7 +51,9 @@ impl FlankBalance {
         self.outer_slope += weight * (outer - self.outer_slope);
         let is_peak = self.inner_slope > 0.0 && self.outer_slope > 0.0;
         let half = 0.5 * scale;
-        is_peak.then(|| half * ((e1 - l1) / self.inner_slope - (e3 - l3) / self.outer_slope))
+        let slopes = self.inner_slope * self.outer_slope;
+        let difference = (e1 - l1) * self.outer_slope - (e3 - l3) * self.inner_slope;
+        is_peak.then(|| half * difference / slopes)
     }
 
     /// Forgets all shapes.

@@ -124,10 +124,11 @@ impl ChannelMonitor for ShapeMonitor {
     }
 
     fn step(&mut self, input: &Shape) -> Result<ChannelVerdict, MonitorError> {
-        if let Some(bad) = input.magnitudes.iter().find(|m| !m.is_finite()) {
+        let total: f64 = input.magnitudes.iter().sum();
+        if !total.is_finite() {
             return Err(MonitorError::Value {
-                name: "magnitude of a correlator sum",
-                value: *bad,
+                name: "sum of the magnitudes of a shape",
+                value: total,
                 expected: "a finite number",
             });
         }
