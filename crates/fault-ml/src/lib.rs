@@ -4,7 +4,7 @@
 //! of all satellites. Both state a score and the threshold it is held against: faulty is exactly
 //! a score above its threshold. What to do about it is for others to decide.
 //!
-//! [`InnovationTest`] is the first monitor: it needs no training. [`learned`] holds those that do,
+//! [`InnovationTest`] is the first monitor: it needs no training. [`shape`] watches the correlation itself by a control chart. [`learned`] holds those that do,
 //! [`metrics`] the figures by which all are compared.
 //!
 //! [`particle`] holds integrity monitoring by particle filters, [`classical`] the detectors it is
@@ -66,6 +66,7 @@ mod noise_fit;
 mod noise_model;
 pub mod particle;
 mod readmission;
+pub mod shape;
 mod sight;
 #[cfg(test)]
 mod test_sky;

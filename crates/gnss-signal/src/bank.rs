@@ -48,6 +48,16 @@ impl TapOffsets {
         Self { chips, len: 3 }
     }
 
+    /// These offsets and then `further` ones; `None` where they are more than [`MAX_TAPS`].
+    #[must_use]
+    pub fn with(mut self, further: &Self) -> Option<Self> {
+        let (first, len) = (usize::from(self.len), usize::from(self.len + further.len));
+        let free = self.chips.get_mut(first..len)?;
+        free.copy_from_slice(further.as_slice());
+        self.len = len as u8;
+        Some(self)
+    }
+
     /// The offsets, chips.
     #[must_use]
     pub fn as_slice(&self) -> &[f64] {
@@ -190,4 +200,19 @@ pub trait CorrelatorBank {
     /// # Errors
     /// [`SignalError::NotHeld`] where the search reaches outside the held samples.
     fn search(&mut self, request: &SearchRequest) -> Result<SearchReport, SignalError>;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn further_taps_follow_as_far_as_there_is_room() {
+        let three = TapOffsets::early_prompt_late(0.5);
+        let further = TapOffsets::new(&[-0.4, 0.4]).unwrap();
+        let five = three.with(&further).unwrap();
+        assert_eq!(five.as_slice(), [-0.25, 0.0, 0.25, -0.4, 0.4]);
+        let many = TapOffsets::new(&[0.1; 14]).unwrap();
+        assert_eq!(three.with(&many), None);
+    }
 }

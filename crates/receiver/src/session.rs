@@ -1,6 +1,7 @@
 //! One run of the receiver over any source of correlator sums, with its files.
 
 use fault_ml::learned::ModelKind;
+use fault_ml::shape::ShapeSettings;
 use gnss_nav::GpsTime;
 use gnss_signal::{CorrelatorBank, SignalId};
 
@@ -8,7 +9,7 @@ use crate::ReceiverError;
 use crate::config::{Ionosphere, Mode, MonitorChoice, RunConfig, Troposphere};
 use crate::cost::Meter;
 use crate::models::default_model;
-use crate::pipeline::{self, Aiding, Outcome, Settings, VectorSettings};
+use crate::pipeline::{self, Aiding, Outcome, Settings, ShapeWatching, VectorSettings};
 use crate::rinex_nav::{self, NavigationFile};
 use crate::samples;
 use crate::sink::outputs::{Ending, OutputSettings, Outputs, write_cost};
@@ -109,6 +110,13 @@ fn settings(config: &RunConfig, nav: Option<NavigationFile>) -> Result<Settings,
         aiding,
         duration_s: config.recording.duration_s,
         dump_taps: config.dump_taps,
+        shape: config
+            .monitors
+            .contains(&MonitorChoice::Ewma)
+            .then_some(ShapeWatching {
+                chart: ShapeSettings::default(),
+                policy: config.policy,
+            }),
         vector: (config.mode == Mode::Vector)
             .then(|| vector(config))
             .transpose()?,
@@ -121,7 +129,7 @@ fn monitors(config: &RunConfig) -> Vec<String> {
     let running = config
         .monitors
         .iter()
-        .filter(|_| config.mode == Mode::Vector);
+        .filter(|m| config.mode == Mode::Vector || **m == MonitorChoice::Ewma);
     let names = running.map(|monitor| monitor.name());
     names
         .chain(config.raim.scored())
@@ -132,7 +140,7 @@ fn monitors(config: &RunConfig) -> Vec<String> {
 fn vector(config: &RunConfig) -> Result<VectorSettings, ReceiverError> {
     let default = VectorSettings::default();
     let learned = config.monitors.iter().filter_map(|monitor| match monitor {
-        MonitorChoice::Innovation => None,
+        MonitorChoice::Innovation | MonitorChoice::Ewma => None,
         MonitorChoice::Svm => Some(ModelKind::Svm),
         MonitorChoice::Lstm => Some(ModelKind::Lstm),
     });

@@ -3,7 +3,7 @@
 use super::discriminator::CodeDiscriminator;
 use super::loop_filter::{CarrierBandwidth, LoopOrder};
 use super::steered::SteeredSettings;
-use crate::SignalError;
+use crate::{SignalError, TapOffsets};
 
 /// Which way the front end maps the spectrum.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -60,6 +60,9 @@ pub struct TrackingSettings {
     pub longest_pull_in_periods: u32,
     /// Measurements while navigation steers.
     pub steered: SteeredSettings,
+    /// Taps that steady tracking asks for behind early, prompt and late, for others to look at. It does
+    /// without them where the samples' grid takes more than three taps itself. Default: none.
+    pub further_taps: Option<TapOffsets>,
 }
 
 impl Default for TrackingSettings {
@@ -84,6 +87,7 @@ impl Default for TrackingSettings {
             patience_s: 1.0,
             longest_pull_in_periods: 1000,
             steered: SteeredSettings::default(),
+            further_taps: None,
         }
     }
 }

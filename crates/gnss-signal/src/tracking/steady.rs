@@ -223,7 +223,15 @@ impl Steady {
         let spacing = self.settings.spacing_chips;
         let taps = crate::TapOffsets::early_prompt_late(spacing);
         let replica = self.nco.replica(self.nco.tick_of_period(end), taps);
-        with_taps(replica, spacing, self.nco.front_end.sample_rate_hz)
+        let replica = with_taps(replica, spacing, self.nco.front_end.sample_rate_hz);
+        let further = self.settings.further_taps.as_ref();
+        let further = further.filter(|_| replica.tap_offsets == taps);
+        Replica {
+            tap_offsets: further
+                .and_then(|f| taps.with(f))
+                .unwrap_or(replica.tap_offsets),
+            ..replica
+        }
     }
 
     /// Takes the sums of `replica`.

@@ -14,9 +14,6 @@ use crate::ReceiverError;
 use crate::pipeline::{FilterKind, Policy};
 use crate::sigmf::{self, Sidecar};
 
-/// Factor on the variance of a satellite whose weight is lowered: a tenth of its deviation's say.
-const DEWEIGHTED: f64 = 100.0;
-
 /// Where an option was given, for errors.
 pub(super) enum Origin {
     CommandLine,
@@ -309,9 +306,9 @@ impl Checks<'_> {
     }
 
     fn monitors(&self, given: &RunOptions) -> Result<Vec<MonitorChoice>, ReceiverError> {
-        use MonitorChoice::{Innovation, Lstm, Svm};
-        let [innovation, svm, lstm] = [Innovation, Svm, Lstm].map(|m| (m.name(), Some(m)));
-        let choices = [innovation, svm, lstm, ("none", None)];
+        use MonitorChoice::{Ewma, Innovation, Lstm, Svm};
+        let named = [Innovation, Svm, Lstm, Ewma].map(|m| (m.name(), Some(m)));
+        let choices: Vec<_> = named.into_iter().chain([("none", None)]).collect();
         let chosen = |name: &String| self.choice("monitor", Some(name), "", &choices);
         if given.monitor.is_empty() {
             return Ok(vec![Innovation]);
@@ -332,7 +329,7 @@ impl Checks<'_> {
 
     fn policy(&self, given: &RunOptions) -> Result<Policy, ReceiverError> {
         let deweight = Policy::Deweight {
-            variance_factor: DEWEIGHTED,
+            variance_factor: Policy::VARIANCE_FACTOR,
         };
         let policies = [
             ("observe", Policy::Observe),

@@ -92,6 +92,8 @@ pub enum MonitorChoice {
     Svm,
     /// The long short-term memory that comes with it.
     Lstm,
+    /// The chart on the shape of the correlation.
+    Ewma,
 }
 
 impl MonitorChoice {
@@ -102,6 +104,7 @@ impl MonitorChoice {
             Self::Innovation => "innovation",
             Self::Svm => "svm",
             Self::Lstm => "lstm",
+            Self::Ewma => "ewma",
         }
     }
 }
@@ -136,7 +139,7 @@ pub struct RunConfig {
     pub mode: Mode,
     /// Which filter, in vector mode.
     pub filter: FilterKind,
-    /// Who watches every channel in vector mode, each once, in order.
+    /// Who watches every channel, each once, in order: the chart always, the others in vector mode.
     pub monitors: Vec<MonitorChoice>,
     /// What follows from a monitor's alarm.
     pub policy: Policy,

@@ -43,9 +43,9 @@ fn each_runs_once_and_none_stands_alone() {
     );
     let error = check("monitor = ['none', 'svm']").unwrap_err().to_string();
     assert!(error.contains("nothing beside it"), "{error}");
-    let error = check("monitor = 'ewma'").unwrap_err().to_string();
+    let error = check("monitor = 'shewhart'").unwrap_err().to_string();
     assert!(
-        error.contains("one of innovation, svm, lstm, none"),
+        error.contains("one of innovation, svm, lstm, ewma, none"),
         "{error}"
     );
 }

@@ -51,13 +51,13 @@ pub struct RunOptions {
     /// Filter of vector mode: sequential or batch [default: sequential]
     #[arg(long, value_name = "FILTER")]
     pub filter: Option<String>,
-    /// Monitor of every channel in vector mode: innovation, svm, lstm, or none; may be repeated
-    /// [default: innovation]
+    /// Monitor of every channel: ewma (shape of the correlation); in vector mode also innovation, svm,
+    /// lstm; or none; may be repeated [default: innovation]
     #[arg(long, value_name = "MONITOR")]
     #[serde(deserialize_with = "one_or_several")]
     pub monitor: Vec<String>,
-    /// What follows from a monitor's alarm: observe, deweight (variance times 100) or exclude
-    /// [default: exclude]
+    /// What follows from a monitor's alarm: observe, deweight (variance times 100, or by the error that
+    /// ewma suspects) or exclude [default: exclude]
     #[arg(long, value_name = "POLICY")]
     pub policy: Option<String>,
     /// Navigation epochs per second, up to 50 [default: 10]

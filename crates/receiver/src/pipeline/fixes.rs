@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use gnss_nav::SatelliteId;
 use gnss_nav::integrity::Misfit;
 use gnss_signal::CorrelatorBank;
 
@@ -9,6 +10,7 @@ use super::navigator::Tracked;
 use super::report;
 use super::run::{Fixed, Run};
 use super::slot::Slot;
+use super::vector;
 use crate::ReceiverError;
 use crate::record::{EventKind, PvtRecord, Record};
 
@@ -16,6 +18,9 @@ impl<B: CorrelatorBank> Run<'_, B> {
     /// Position, velocity and time of this epoch by least squares, and all its records.
     pub(super) fn navigate(&mut self, now: u64) -> Result<(), ReceiverError> {
         let time_s = self.time_s(now);
+        for (satellite, kind) in self.follow_shapes() {
+            self.emit(now, Some(satellite), kind)?;
+        }
         let mut tracked = tracked(now, &mut self.slots);
         let navigated = self.navigator.navigate(now, &mut tracked);
         let observations = report::observations(time_s, &mut tracked, &navigated);
@@ -41,6 +46,15 @@ impl<B: CorrelatorBank> Run<'_, B> {
         } else {
             self.report_fix(now, Fixed::Before)
         }
+    }
+
+    /// Believes the satellites anew by the shapes of their correlations; returns what changed.
+    fn follow_shapes(&mut self) -> Vec<(SatelliteId, EventKind)> {
+        let change = |slot: &mut Slot| {
+            let (change, policy) = slot.shape.as_mut()?.follow()?;
+            Some((slot.satellite, vector::change(&change, policy)))
+        };
+        self.slots.iter_mut().filter_map(change).collect()
     }
 
     pub(super) fn report_fix(&mut self, now: u64, to: Fixed) -> Result<(), ReceiverError> {

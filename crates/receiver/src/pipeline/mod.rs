@@ -5,6 +5,7 @@
 //! Up goes the search for a satellite that was lost and, in vector tracking, where the filter steers
 //! every channel.
 
+mod belief;
 mod clock;
 mod discontinuity;
 mod fixes;
@@ -15,6 +16,7 @@ mod report;
 mod run;
 mod schedule;
 mod settings;
+mod shape;
 mod sky;
 mod slot;
 mod spectrum;
@@ -25,5 +27,5 @@ mod vector_mode;
 pub use outcome::Outcome;
 pub(crate) use report::{filtered as filter_record, innovation, pvt as solution_record};
 pub use run::run;
-pub use settings::{Aiding, Settings};
+pub use settings::{Aiding, Settings, ShapeWatching};
 pub use vector::{FilterKind, MeasurementNoise, Policy, VectorSettings};

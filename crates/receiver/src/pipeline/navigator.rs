@@ -3,6 +3,7 @@
 use gnss_nav::atmosphere::Klobuchar;
 use gnss_nav::coarse_time::{self, Prior, SnapshotMeasurement, SnapshotSolution};
 use gnss_nav::constants::{L1_HZ, L1_WAVELENGTH_M, SPEED_OF_LIGHT_MPS};
+use gnss_nav::filter::Disposition;
 use gnss_nav::integrity::{Assured, Misfit, ProtectionLevels};
 use gnss_nav::least_squares::{Consistency, Solution};
 use gnss_nav::measurement::{ErrorModel, Formed, MeasurementModel, RawMeasurement, form};
@@ -57,6 +58,8 @@ pub(super) struct Navigated {
     pub(super) receive_time: Option<GpsTime>,
     /// The measurements, where the clock is good enough.
     pub(super) raw: Vec<RawMeasurement>,
+    /// What the solution did with each by the shape of its correlation.
+    pub(super) dispositions: Vec<Disposition>,
 }
 
 impl Navigated {
@@ -68,6 +71,7 @@ impl Navigated {
             protection: None,
             receive_time: None,
             raw: Vec::new(),
+            dispositions: Vec::new(),
         }
     }
 
@@ -289,7 +293,12 @@ impl Navigator {
         let solved = self
             .watch
             .epoch(time_s, &formed.measurements, &model, &start);
-        let receive_time = self.clock.map(|c| c.at(tick));
+        let unsolved = Navigated {
+            receive_time: self.clock.map(|c| c.at(tick)),
+            dispositions: shape_dispositions(&raw, tracked),
+            raw,
+            ..Navigated::nothing()
+        };
         match solved {
             Ok(Assured {
                 solution,
@@ -299,14 +308,9 @@ impl Navigator {
                 fix: Some((solution, Source::LeastSquares)),
                 misfits,
                 protection,
-                receive_time,
-                raw,
+                ..unsolved
             },
-            Err(_) => Navigated {
-                receive_time,
-                raw,
-                ..Navigated::nothing()
-            },
+            Err(_) => unsolved,
         }
     }
 
@@ -320,6 +324,7 @@ impl Navigator {
         Navigated {
             fix,
             receive_time: self.clock.filter(|_| exact).map(|c| c.at(tick)),
+            dispositions: Vec::new(),
             raw,
             ..Navigated::nothing()
         }
@@ -436,7 +441,10 @@ impl Navigator {
                 ))
             })
             .collect();
-        let formed = form(receive_time, &raw, &self.store);
+        let told = shape_dispositions(&raw, tracked);
+        let both = raw.iter().zip(told);
+        let believed: Vec<_> = both.filter_map(|(r, told)| weighted(r, told)).collect();
+        let formed = form(receive_time, &believed, &self.store);
         (raw, formed)
     }
 
@@ -479,6 +487,38 @@ fn raw_measurement(
         pseudorange_variance_m2: code_variance_m2(epoch),
         range_rate_variance_m2: wavelength_m * wavelength_m * epoch.doppler_variance_hz2,
         cn0_dbhz: epoch.cn0_dbhz,
+    }
+}
+
+/// Fewer satellites make no solution.
+const NEEDED: usize = 4;
+
+/// Measurements and what is to be done with them by the shapes of their satellites' correlations: weighted,
+/// not left out, where too few would be left.
+fn shape_dispositions(raw: &[RawMeasurement], tracked: &[Tracked]) -> Vec<Disposition> {
+    let shape = |r: &RawMeasurement| {
+        let mut of = tracked.iter().filter(|t| t.slot.satellite == r.satellite);
+        of.find_map(|t| t.slot.shape.as_ref())
+    };
+    let told = |r: &RawMeasurement| shape(r).map_or(Disposition::Use, |s| s.disposition(r));
+    let all: Vec<_> = raw.iter().map(told).collect();
+    let left = all.iter().filter(|d| **d != Disposition::Exclude).count();
+    if left == all.len() || left >= NEEDED {
+        return all;
+    }
+    let weighted = |r: &RawMeasurement| shape(r).map_or(Disposition::Use, |s| s.weighted(r));
+    raw.iter().map(weighted).collect()
+}
+
+/// A measurement with its weight, unless it is left out.
+fn weighted(raw: &RawMeasurement, disposition: Disposition) -> Option<RawMeasurement> {
+    match disposition {
+        Disposition::Use => Some(*raw),
+        Disposition::Deweight { variance_factor } => Some(RawMeasurement {
+            pseudorange_variance_m2: raw.pseudorange_variance_m2 * variance_factor,
+            ..*raw
+        }),
+        Disposition::Exclude => None,
     }
 }
 

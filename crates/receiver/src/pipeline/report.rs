@@ -1,18 +1,20 @@
 //! Records of a navigation epoch.
 
 use gnss_nav::constants::L1_WAVELENGTH_M;
-use gnss_nav::filter::{Covariance, Innovation};
+use gnss_nav::filter::{Covariance, Disposition as Told, Innovation};
 use gnss_nav::geodesy::Geodetic;
 use gnss_nav::least_squares::Solution;
 use gnss_nav::{NavState, RawMeasurement, SatelliteId};
 use gnss_signal::tracking::{ChannelEpoch, Lock};
 use nalgebra::Matrix3;
 
+use super::belief::Said;
 use super::navigator::{Navigated, Tracked, is_contradictory};
+use super::shape::{self, ShapeWatch};
 use super::slot::Slot;
 use crate::record::{
     CarrierPhase, ChannelRecord, Disposition, InnovationRecord, LoopMembership, Observation,
-    ObservationEpoch, PvtRecord, Source, Status, TrackingRecord, VelocityRecord,
+    ObservationEpoch, PvtRecord, ScoreRecord, Source, Status, TrackingRecord, VelocityRecord,
 };
 
 /// The solution as a record.
@@ -167,6 +169,7 @@ pub(super) fn channel(time_s: f64, tracked: &Tracked, navigated: &Navigated) -> 
     let epoch: &ChannelEpoch = &tracked.epoch;
     let raw = navigated.raw.iter().find(|r| r.satellite == satellite);
     let (innovation_code_m, innovation_rate_mps) = residuals(satellite, navigated);
+    let shape = tracked.slot.shape.as_ref().and_then(ShapeWatch::said);
     ChannelRecord {
         time_s,
         satellite,
@@ -178,7 +181,19 @@ pub(super) fn channel(time_s: f64, tracked: &Tracked, navigated: &Navigated) -> 
         innovation_rate_mps,
         shown: None,
         disposition: disposition(satellite, navigated),
-        scores: Vec::new(),
+        scores: shape
+            .into_iter()
+            .map(|s| score(&(shape::NAME, s.judgement)))
+            .collect(),
+    }
+}
+
+/// What a monitor said, as a record.
+pub(super) fn score((monitor, judgement): &Said) -> ScoreRecord {
+    ScoreRecord {
+        monitor: (*monitor).to_owned(),
+        score: judgement.score(),
+        threshold: judgement.threshold(),
     }
 }
 
@@ -186,10 +201,17 @@ fn disposition(satellite: SatelliteId, navigated: &Navigated) -> Disposition {
     let Some((solution, _)) = &navigated.fix else {
         return Disposition::Unavailable;
     };
-    if solution.excluded.contains(&satellite) {
+    let mut both = navigated.raw.iter().zip(&navigated.dispositions);
+    let told = both
+        .find(|(r, _)| r.satellite == satellite)
+        .map(|(_, told)| *told);
+    if solution.excluded.contains(&satellite) || told == Some(Told::Exclude) {
         Disposition::Exclude
     } else if solution.satellites.iter().any(|s| s.satellite == satellite) {
-        Disposition::Use
+        match told {
+            Some(Told::Deweight { variance_factor }) => Disposition::Deweight { variance_factor },
+            _ => Disposition::Use,
+        }
     } else {
         Disposition::Unavailable
     }

@@ -2,15 +2,17 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use fault_ml::shape::SHAPE_TAPS_CHIPS;
 use gnss_nav::SatelliteId;
 use gnss_signal::tracking::{NoiseFloor, Spectrum, TrackingSettings};
-use gnss_signal::{CorrelatorBank, FrontEnd, Replica, SignalId, Taps};
+use gnss_signal::{CorrelatorBank, FrontEnd, Replica, SignalId, TapOffsets, Taps};
 
 use super::discontinuity;
 use super::navigator::Navigator;
 use super::outcome::{Outcome, why_no_fix};
 use super::schedule::Schedule;
 use super::settings::Settings;
+use super::shape::ShapeWatch;
 use super::slot::Slot;
 use super::spectrum::SpectrumSense;
 use super::vector::{Monitor, VectorSettings, VectorTracking};
@@ -39,7 +41,8 @@ pub fn run<B: CorrelatorBank>(
         navigator: Navigator::new(settings, front_end.sample_rate_hz)?,
         schedule: Schedule::new(front_end.sample_rate_hz),
         spectrum: SpectrumSense::default(),
-        tracking: settings.tracking,
+        tracking: tracking(settings)?,
+        shape: ShapeWatch::new(settings)?,
         bank,
         settings,
         front_end,
@@ -61,6 +64,15 @@ pub fn run<B: CorrelatorBank>(
     run.until_the_end()
 }
 
+/// Tracking, with the taps of whoever watches.
+fn tracking(settings: &Settings) -> Result<TrackingSettings, ReceiverError> {
+    let taps = settings.shape.map(|_| TapOffsets::new(&SHAPE_TAPS_CHIPS));
+    Ok(TrackingSettings {
+        further_taps: taps.transpose()?.or(settings.tracking.further_taps),
+        ..settings.tracking
+    })
+}
+
 /// Whether there is a solution.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Fixed {
@@ -80,6 +92,8 @@ pub(super) struct Run<'a, B> {
     pub(super) schedule: Schedule,
     pub(super) spectrum: SpectrumSense,
     pub(super) tracking: TrackingSettings,
+    /// The chart of a channel that has seen nothing.
+    pub(super) shape: Option<ShapeWatch>,
     pub(super) slots: Vec<Slot>,
     pub(super) acquired: BTreeSet<SignalId>,
     pub(super) excluded: BTreeSet<SatelliteId>,

@@ -1,5 +1,6 @@
 //! What a run is told: valid values, no text and no files.
 
+use fault_ml::shape::ShapeSettings;
 use gnss_nav::atmosphere::Klobuchar;
 use gnss_nav::integrity::IntegritySettings;
 use gnss_nav::measurement::ErrorModel;
@@ -8,7 +9,7 @@ use gnss_signal::SignalId;
 use gnss_signal::tracking::TrackingSettings;
 use nalgebra::Vector3;
 
-use super::vector::VectorSettings;
+use super::vector::{Policy, VectorSettings};
 use crate::raim::Raim;
 
 /// Settings of a run.
@@ -43,8 +44,20 @@ pub struct Settings {
     pub duration_s: Option<f64>,
     /// Whether every integration's sums are reported.
     pub dump_taps: bool,
+    /// The chart on the shape of every channel's correlation; its taps are asked for beside early, prompt and
+    /// late. Default: none.
+    pub shape: Option<ShapeWatching>,
     /// Vector tracking once there is a consistent fix; `None`: scalar tracking throughout.
     pub vector: Option<VectorSettings>,
+}
+
+/// How the shape of correlations is watched.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ShapeWatching {
+    /// The chart.
+    pub chart: ShapeSettings,
+    /// What follows from its alarms in scalar tracking. In vector tracking the policy of all monitors does.
+    pub policy: Policy,
 }
 
 /// What is known from elsewhere before the first sample.
@@ -79,6 +92,7 @@ impl Default for Settings {
             aiding: Aiding::default(),
             duration_s: None,
             dump_taps: false,
+            shape: None,
             vector: None,
         }
     }

@@ -112,7 +112,7 @@ impl<B: CorrelatorBank> Run<'_, B> {
     pub(super) fn slot(&self, hit: &AcquisitionHit) -> Slot {
         let near = self.navigator.near();
         let pivot_week = near.map_or(DEFAULT_PIVOT_WEEK, GpsTime::week);
-        Slot::new(hit, self.front_end, self.tracking, pivot_week)
+        Slot::new(hit, self.front_end, self.tracking, pivot_week).watched(self.shape.clone())
     }
 }
 

@@ -8,6 +8,7 @@ use gnss_signal::tracking::{
 };
 use gnss_signal::{AcquisitionHit, FrontEnd, Replica, Signal, SignalId, Taps};
 
+use super::shape::ShapeWatch;
 use super::vector::steering;
 
 /// One satellite being received.
@@ -27,6 +28,8 @@ pub(super) struct Slot {
     /// Whether the acquisition was reported.
     pub(super) announced: bool,
     pub(super) bits_found: bool,
+    /// The shape of its correlation, where that is watched.
+    pub(super) shape: Option<ShapeWatch>,
     /// Cycles added to the carrier phase so that it agrees with the first pseudorange.
     phase_offset_cycles: Option<f64>,
 }
@@ -61,6 +64,7 @@ impl Slot {
             predicted: false,
             announced: false,
             bits_found: false,
+            shape: None,
             phase_offset_cycles: None,
         }
     }
@@ -100,6 +104,12 @@ impl Slot {
         }
     }
 
+    /// This slot under watch by `shape`.
+    pub(super) fn watched(mut self, shape: Option<ShapeWatch>) -> Self {
+        self.shape = shape;
+        self
+    }
+
     /// This slot in place of `old`: what was reported of that one stays reported.
     pub(super) const fn succeeding(mut self, old: &Self) -> Self {
         self.announced = old.announced;
@@ -115,6 +125,9 @@ impl Slot {
         noise: &NoiseFloor,
     ) -> (ChannelUpdate, Vec<Decoded>) {
         let update = self.channel.update(replica, taps, noise);
+        if let Some(shape) = &mut self.shape {
+            shape.step(replica, taps, &self.channel);
+        }
         self.bits_found |= update.bit_sync.is_some();
         let decoded = update.bit.map_or_else(Vec::new, |bit| {
             self.decoder.push(NavBit {

@@ -62,7 +62,7 @@ impl<B: CorrelatorBank> Run<'_, B> {
 
     fn join(&mut self, tick: u64, signal: SignalId, expected: &Expected) {
         let slot = Slot::predicted(signal, self.front_end, self.tracking, tick, expected);
-        self.slots.push(slot);
+        self.slots.push(slot.watched(self.shape.clone()));
         self.slots.sort_by_key(|s| s.satellite);
     }
 

@@ -31,6 +31,8 @@ use gnss_nav::{
 use gnss_signal::tracking::{ChannelEpoch, Lock};
 use nalgebra::{Vector3, Vector4};
 
+use super::belief::Change;
+use super::shape::{ShapeSaid, ShapeWatch};
 use super::slot::Slot;
 use crate::ReceiverError;
 use crate::record::EventKind;
@@ -39,17 +41,17 @@ use acceleration::Velocities;
 use filter::from_solution;
 pub(super) use monitors::Monitor;
 use monitors::deviations;
-pub(super) use report::observations;
+pub(super) use report::{change, observations};
 pub use settings::{FilterKind, MeasurementNoise, Policy, VectorSettings};
 pub(super) use steering::steering;
-use watch::{Change, Watch};
+use watch::Watch;
 
 /// Satellites of a fix.
 const NEEDED: usize = 4;
 /// A position is predicted, not measured, once no fix's worth of satellites was used for so long, s.
 const STALE_S: f64 = 0.1;
 /// Healthy for so long, s, a satellite is believed again.
-const READMIT_S: f64 = 2.0;
+pub(super) const READMIT_S: f64 = 2.0;
 /// A message tells another time than the filter's when they are this far apart, s: half a code period.
 const TIME_DISAGREES_S: f64 = 0.5e-3;
 /// So many messages are believed rather than the filter: one may be damaged.
@@ -94,6 +96,8 @@ pub(super) struct Member {
     pub(super) innovation: Option<SatelliteInnovation>,
     /// What its monitors were shown.
     pub(super) shown: Option<ChannelStep>,
+    /// What the shape of its correlation says, where that is watched.
+    pub(super) shape: Option<ShapeSaid>,
     /// What the filter was told of it; `None` where it had nothing to be told of.
     pub(super) disposition: Option<Disposition>,
     /// Whether the filter used its pseudorange.
@@ -316,6 +320,7 @@ impl VectorTracking {
             raw,
             innovation: None,
             shown: None,
+            shape: slot.shape.as_ref().and_then(ShapeWatch::said),
             disposition: None,
             used: false,
             expected,
@@ -395,6 +400,7 @@ impl VectorTracking {
     ) -> Result<Vec<(SatelliteId, Disposition)>, ReceiverError> {
         let policy = self.settings.policy;
         let mut dispositions = Vec::new();
+        let mut weighted = Vec::new();
         let believed = |satellite| {
             let watch = self.watches.get(&satellite);
             watch.is_none_or(|watch| !watch.is_suspended())
@@ -408,15 +414,25 @@ impl VectorTracking {
             };
             let step = monitors::step(innovation, given, &member.epoch);
             member.shown = Some(step);
+            let (shape, raw) = (member.shape, member.raw);
+            let variance_m2 = raw.map_or(f64::INFINITY, |r| r.pseudorange_variance_m2);
             let watch = self.watch(satellite);
-            let change = watch.judge(&step)?;
-            dispositions.push((satellite, watch.disposition(policy)));
+            let change = watch.judge(&step, shape)?;
+            let disposition = watch.disposition(policy, variance_m2.sqrt());
+            weighted.push(watch.weighted(variance_m2.sqrt()).unwrap_or(disposition));
+            dispositions.push((satellite, disposition));
             if let Some(change) = change {
-                report::change(satellite, &change, policy, &mut epoch.events);
+                let kind = report::change(&change, policy);
+                epoch.events.push((Some(satellite), kind));
                 if change == Change::Cleared {
                     self.faults.forget(satellite);
                 }
             }
+        }
+        let left = dispositions.iter().filter(|d| d.1 != Disposition::Exclude);
+        if left.count() < NEEDED {
+            let each = dispositions.iter_mut().zip(weighted);
+            each.for_each(|((_, told), weighted)| *told = weighted);
         }
         Ok(dispositions)
     }
@@ -468,7 +484,8 @@ impl VectorTracking {
             let Some(change) = self.watch(*satellite).isolate(skipped) else {
                 continue;
             };
-            report::change(*satellite, &change, policy, &mut epoch.events);
+            let kind = report::change(&change, policy);
+            epoch.events.push((Some(*satellite), kind));
         }
     }
 

@@ -1,13 +1,13 @@
 //! Records of vector tracking.
 
-use fault_ml::Judgement;
+use gnss_nav::GpsTime;
 use gnss_nav::filter::Disposition;
-use gnss_nav::{GpsTime, SatelliteId};
 use gnss_signal::tracking::Lock;
 
-use super::watch::{Change, Watch};
+use super::watch::Watch;
 use super::{Epoch, Member, Policy, VectorTracking};
-use crate::pipeline::report::{filtered, innovation, observation, tracking};
+use crate::pipeline::belief::Change;
+use crate::pipeline::report::{filtered, innovation, observation, score, tracking};
 use crate::pipeline::slot::Slot;
 use crate::record::{
     self, ChannelRecord, EventKind, FilterRecord, LoopMembership, ObservationEpoch, PvtRecord,
@@ -15,34 +15,26 @@ use crate::record::{
 };
 
 /// Says what changed in the belief in a satellite.
-pub(super) fn change(
-    satellite: SatelliteId,
-    change: &Change,
-    policy: Policy,
-    events: &mut Vec<(Option<SatelliteId>, EventKind)>,
-) {
-    let kind = match change {
-        Change::Alarm { monitor, judgement } => {
-            let monitor = (*monitor).to_owned();
-            let (score, threshold) = (judgement.score(), judgement.threshold());
-            if policy == Policy::Exclude {
-                EventKind::Excluded {
-                    monitor,
-                    score,
-                    threshold,
-                    residual_m: None,
-                }
-            } else {
-                EventKind::Alarm {
-                    monitor,
-                    score,
-                    threshold,
-                }
-            }
-        }
-        Change::Cleared => EventKind::Readmitted,
+pub(in crate::pipeline) fn change(change: &Change, policy: Policy) -> EventKind {
+    let Change::Alarm { monitor, judgement } = change else {
+        return EventKind::Readmitted;
     };
-    events.push((Some(satellite), kind));
+    let monitor = (*monitor).to_owned();
+    let (score, threshold) = (judgement.score(), judgement.threshold());
+    if policy == Policy::Exclude {
+        EventKind::Excluded {
+            monitor,
+            score,
+            threshold,
+            residual_m: None,
+        }
+    } else {
+        EventKind::Alarm {
+            monitor,
+            score,
+            threshold,
+        }
+    }
 }
 
 impl VectorTracking {
@@ -118,11 +110,6 @@ pub(in crate::pipeline) fn observations(
 }
 
 fn scores(watch: &Watch) -> Vec<ScoreRecord> {
-    let score = |(monitor, judgement): &(&str, Judgement)| ScoreRecord {
-        monitor: (*monitor).to_owned(),
-        score: judgement.score(),
-        threshold: judgement.threshold(),
-    };
     watch.judgements().iter().map(score).collect()
 }
 

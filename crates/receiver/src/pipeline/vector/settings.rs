@@ -73,6 +73,11 @@ pub struct VectorSettings {
     pub policy: Policy,
 }
 
+impl Policy {
+    /// Usual factor on the variance of what is deweighted.
+    pub const VARIANCE_FACTOR: f64 = 100.0;
+}
+
 impl VectorSettings {
     /// The monitors of a channel, if all settings are possible.
     ///

@@ -33,6 +33,9 @@ const MOST_MARKS: usize = 60;
 /// Most marks with their names beside them; more would cover one another, and the table of faults has them.
 const MOST_LABELS: usize = 8;
 
+/// The monitor whose chart is drawn.
+const SHAPE_MONITOR: &str = "ewma";
+
 /// Collects what the page shows, in memory that does not grow with the length of the run.
 #[derive(Debug)]
 pub struct Report {
@@ -54,6 +57,8 @@ struct SatelliteHistory {
     cn0_dbhz: Series,
     /// Innovation of the pseudorange over its standard deviation.
     innovation: Series,
+    /// Mean of the chart on the shape of the correlation over its limit.
+    shape: Series,
     sky: sky::Path<2>,
 }
 
@@ -117,6 +122,11 @@ impl Report {
         }
         if let Some(InnovationRecord { value, sigma }) = channel.innovation_code_m {
             history.innovation.push(channel.time_s, value / sigma);
+        }
+        if let Some(score) = channel.scores.iter().find(|s| s.monitor == SHAPE_MONITOR) {
+            history
+                .shape
+                .push(channel.time_s, score.score / score.threshold);
         }
     }
 

@@ -67,6 +67,7 @@ pub(super) fn page(report: &Report, summary: &Summary) -> String {
     html += "</div>\n";
     html += &card("C/N0", cn0(report, &marks));
     html += &card("Code innovations", innovations(report, &marks));
+    html += &card("Shape of the correlation (EWMA)", shapes(report, &marks));
     html += &card("Height above the ellipsoid", height(report, &marks));
     html += &card("Faults", faults(summary));
     if is_of_signals(summary) {
@@ -173,6 +174,17 @@ fn innovations(report: &Report, marks: &[Mark]) -> Option<String> {
         lines: per_satellite(report, |history| &history.innovation),
         marks,
         levels: &[-INNOVATION_LEVEL, INNOVATION_LEVEL],
+        from_zero: true,
+    };
+    chart.svg()
+}
+
+fn shapes(report: &Report, marks: &[Mark]) -> Option<String> {
+    let chart = Chart {
+        unit: "mean / limit",
+        lines: per_satellite(report, |history| &history.shape),
+        marks,
+        levels: &[1.0],
         from_zero: true,
     };
     chart.svg()

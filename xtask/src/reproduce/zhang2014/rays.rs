@@ -1,0 +1,145 @@
+//! Figure 4: two reflections, one after the other, and the chart.
+
+use std::f64::consts::{PI, TAU};
+
+use anyhow::Result;
+use fault_ml::shape::ChartSettings;
+
+use super::channel::{Channel, Seen};
+use super::closed_loop::{Reflection, Setting};
+use super::deviation::COMPLEX_DBHZ;
+use super::map::correlation_coefficient;
+
+/// Signal, s.
+const DURATION_S: f64 = 8.0;
+/// When the first reflection sets in, s.
+pub const ONSET_S: f64 = 2.0;
+/// An integration, s.
+const STEP_S: f64 = 1e-3;
+
+/// A reflection for some time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ray {
+    /// From and until, s.
+    pub during_s: (f64, f64),
+    /// Amplitude.
+    pub amplitude: f64,
+    /// Delay, chips.
+    pub delay_chips: f64,
+    /// Phase at its beginning, rad.
+    pub phase_rad: f64,
+    /// Fading frequency, Hz.
+    pub fading_hz: f64,
+}
+
+/// The paper's table of the two rays is lost; these are ours.
+pub const RAYS: [Ray; 2] = [
+    Ray {
+        during_s: (ONSET_S, 4.0),
+        amplitude: 0.5,
+        delay_chips: 0.4,
+        phase_rad: 0.0,
+        fading_hz: 0.5,
+    },
+    Ray {
+        during_s: (5.0, 7.0),
+        amplitude: 0.4,
+        delay_chips: 0.8,
+        phase_rad: PI,
+        fading_hz: 0.25,
+    },
+];
+
+impl Ray {
+    fn at(&self, time_s: f64) -> Option<Reflection> {
+        let (begin_s, end_s) = self.during_s;
+        (time_s >= begin_s && time_s < end_s).then_some(Reflection {
+            amplitude: self.amplitude,
+            delay_chips: self.delay_chips,
+            phase_rad: self.phase_rad + TAU * self.fading_hz * (time_s - begin_s),
+        })
+    }
+}
+
+/// The reflections of a time.
+#[must_use]
+pub fn reflections(time_s: f64) -> Vec<Reflection> {
+    RAYS.iter().filter_map(|ray| ray.at(time_s)).collect()
+}
+
+/// A run: time, s, and what was seen.
+pub type Run = Vec<(f64, Seen)>;
+
+/// The run of `seed` under `chart`.
+///
+/// # Errors
+/// Where the chart's settings are impossible.
+pub fn run(chart: ChartSettings, seed: u64) -> Result<Run> {
+    let mut channel = Channel::new(Setting::paper(COMPLEX_DBHZ), chart, seed)?;
+    let steps = (DURATION_S / STEP_S).round() as u32;
+    let step = |k: u32| {
+        let time_s = f64::from(k) * STEP_S;
+        (time_s, channel.step(&reflections(time_s)))
+    };
+    Ok((0..steps).map(step).collect())
+}
+
+/// What all runs say.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Detection {
+    /// Runs that alarmed before the first reflection.
+    pub early_alarms: usize,
+    /// Delay of the first alarm after its onset, s, in order; infinite where there was none.
+    pub delays_s: Vec<f64>,
+    /// Correlation of Z with the true error, in order.
+    pub correlations: Vec<f64>,
+}
+
+impl Detection {
+    /// Of `runs`.
+    #[must_use]
+    pub fn of(runs: &[Run]) -> Self {
+        let first = |run: &Run| {
+            run.iter()
+                .find(|(_, seen)| seen.is_outside())
+                .map(|(t, _)| *t)
+        };
+        let alarms: Vec<_> = runs.iter().map(first).collect();
+        let early = |alarm: &&Option<f64>| alarm.is_some_and(|s| s < ONSET_S);
+        let pairs = |run: &Run| -> Vec<_> {
+            run.iter()
+                .map(|(_, seen)| (seen.mean_chips, seen.late_chips))
+                .collect()
+        };
+        let correlations = runs
+            .iter()
+            .filter_map(|run| correlation_coefficient(&pairs(run)));
+        Self {
+            early_alarms: alarms.iter().filter(early).count(),
+            delays_s: ordered(
+                alarms
+                    .iter()
+                    .map(|a| a.map_or(f64::INFINITY, |s| s - ONSET_S)),
+            ),
+            correlations: ordered(correlations),
+        }
+    }
+}
+
+/// `values` from the least to the largest.
+#[must_use]
+pub fn ordered(values: impl IntoIterator<Item = f64>) -> Vec<f64> {
+    let mut all: Vec<f64> = values.into_iter().collect();
+    all.sort_by(f64::total_cmp);
+    all
+}
+
+/// The value below which a `part` of `ordered` lies; NaN of none.
+#[must_use]
+pub fn quantile(ordered: &[f64], part: f64) -> f64 {
+    let place = part * ordered.len().saturating_sub(1) as f64;
+    ordered
+        .get(place.round() as usize)
+        .copied()
+        .unwrap_or(f64::NAN)
+}
