@@ -5,7 +5,8 @@ use std::f64::consts::{PI, TAU};
 use anyhow::{Context, Result};
 use fault_ml::shape::closed_loop_chart;
 use gnss_nav::constants::{CA_CODE_RATE_HZ, SPEED_OF_LIGHT_MPS};
-use gnss_nav::least_squares::{Consistency, solve, solve_with_exclusion};
+use gnss_nav::integrity::{self, IntegritySettings};
+use gnss_nav::least_squares::{Consistency, solve};
 use gnss_nav::measurement::ErrorModel;
 use gnss_nav::{Geodetic, GpsTime, Measurement, MeasurementModel, SatelliteId, SatelliteState};
 use nalgebra::Vector3;
@@ -271,7 +272,13 @@ fn error_m(
     };
     let model = model();
     let solution = match way {
-        Way::Raim | Way::Both => solve_with_exclusion(&used, &model, place, RAIM_FALSE_ALARM)?,
+        Way::Raim | Way::Both => {
+            let settings = IntegritySettings {
+                false_alarm_probability: RAIM_FALSE_ALARM,
+                ..IntegritySettings::default()
+            };
+            integrity::solve(&used, &model, place, &settings)?.solution
+        }
         _ => solve(&used, &model, place)?,
     };
     debug_assert!(solution.consistency != Consistency::Untested || way != Way::Raim);
