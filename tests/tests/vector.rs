@@ -256,3 +256,21 @@ fn a_step_and_a_ramp_of_one_satellite_are_excluded() {
         );
     }
 }
+
+#[test]
+fn a_wrong_ephemeris_is_noticed_and_harmless() {
+    // From the start, where the first fix leaves it out, and uploaded later, where the filter finds it.
+    for (begin_s, latest_s) in [(0, 19.0), (40, 80.0)] {
+        let fault =
+            format!("{{kind=\"wrong_ephemeris\",sat=\"G12\",begin_s={begin_s},along_m=1000}}");
+        let judged = with_fault(&fault);
+        let excluded_s = happened(&judged, 0.0, |k| matches!(k, EventKind::Excluded { .. }));
+        assert!(
+            excluded_s.unwrap() < latest_s,
+            "{begin_s}: {excluded_s:?} s"
+        );
+        for epoch in &judged.epochs {
+            assert!(epoch.horizontal_m() < 5.0, "{begin_s}");
+        }
+    }
+}

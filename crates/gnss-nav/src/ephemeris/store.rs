@@ -30,12 +30,14 @@ impl EphemerisStore {
 
     /// The issue of `satellite` to use at `time`: of those whose curve fit interval contains
     /// `time` the one whose `toe` is nearest, as post-processing programs choose; of two equally
-    /// near the later `toe`. Health is not judged.
+    /// near the later `toe`, of two with the same the one learned last, which corrects the other. Health
+    /// is not judged.
     #[must_use]
     pub fn select(&self, satellite: SatelliteId, time: GpsTime) -> Option<&Ephemeris> {
         self.issues
             .get(&satellite)?
             .iter()
+            .rev()
             .filter(|ephemeris| ephemeris.is_valid_at(time))
             .min_by(|a, b| {
                 let age = |e: &Ephemeris| (time - e.toe).abs();

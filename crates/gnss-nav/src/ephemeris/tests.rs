@@ -151,4 +151,11 @@ fn store_selects_the_nearest_valid_issue() {
     assert_eq!(chosen(14_401.0), None);
     assert_eq!(store.select(SatelliteId::gps(2), toe()), None);
     assert_eq!(store.iter().count(), 2);
+    // Uploaded anew for the same time under another issue.
+    let corrected = Ephemeris {
+        iode: 99,
+        ..circular(1, toe())
+    };
+    assert!(store.insert(corrected));
+    assert_eq!(store.select(satellite, toe()), Some(&corrected));
 }

@@ -129,7 +129,7 @@ impl PullIn {
     /// Looks at the stretch now and then: moves on where it allows, or gives the signal up.
     pub(super) fn look(&mut self, settings: &TrackingSettings) -> Outlook {
         let periods = self.stretch.len();
-        let too_early = periods < LEAST_PERIODS || periods % LOOK_PERIODS != 0;
+        let too_early = periods < LEAST_PERIODS || !periods.is_multiple_of(LOOK_PERIODS);
         if too_early || self.found.is_some() {
             return Outlook::Goes;
         }

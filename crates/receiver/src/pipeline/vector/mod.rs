@@ -3,24 +3,24 @@
 //! This is the one edge along which data goes up: what each channel is steered to follows from the
 //! state of the filter, one epoch later.
 
+mod acceleration;
 mod bit_slip;
 mod clock_step;
 mod filter;
 mod monitors;
 mod report;
+mod restart;
 mod settings;
 mod steering;
 mod watch;
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::BTreeMap;
 
 use gnss_nav::coarse_time::SnapshotSolution;
 use gnss_nav::filter::{
     Advice, Disposition, EpochGeometry, FaultLogic, FaultThresholds, Innovations, NavFilter,
     Observable, SatelliteInnovation, SkipReason, Update,
 };
-use gnss_nav::integrity::{self, IntegritySettings};
-use gnss_nav::least_squares::Consistency;
 use gnss_nav::measurement::form;
 use gnss_nav::prediction::Expected;
 use gnss_nav::{
@@ -34,8 +34,8 @@ use super::slot::Slot;
 use crate::ReceiverError;
 use crate::record::EventKind;
 
-use clock_step::ClockStep;
-use filter::{filter, from_solution};
+use acceleration::Velocities;
+use filter::from_solution;
 pub(super) use monitors::Monitor;
 pub(super) use report::observations;
 pub use settings::{FilterKind, MeasurementNoise, Policy, VectorSettings};
@@ -48,17 +48,10 @@ const NEEDED: usize = 4;
 const STALE_S: f64 = 0.1;
 /// Healthy for so long, s, a satellite is believed again.
 const READMIT_S: f64 = 2.0;
-/// Time over which the receiver's acceleration is a mean, s: long enough that noise of velocities does
-/// not matter over the age of a measurement.
-const ACCELERATION_SPAN_S: f64 = 0.2;
 /// A message tells another time than the filter's when they are this far apart, s: half a code period.
 const TIME_DISAGREES_S: f64 = 0.5e-3;
 /// So many messages are believed rather than the filter: one may be damaged.
 const CONTRADICTING: usize = 2;
-/// An acceleration below two deviations of its noise is none: fed back, noise would grow.
-const SIGNIFICANT_SIGMAS2: f64 = 4.0;
-/// Satellites a fix to start anew from may leave out: most channels may contradict the filter.
-const MOST_FAULTS: usize = 4;
 /// Weak signals may take longer than this to show where their bits begin, s.
 const BITS_PATIENCE_S: f64 = 1.0;
 /// Past this deviation of a predicted range, m, a signal is likely to lie outside the taps: half a
@@ -145,7 +138,7 @@ pub(super) struct VectorTracking {
     geometry: Option<EpochGeometry>,
     /// Channels whose message tells another time, at the last epoch.
     contradicting: usize,
-    velocities: VecDeque<(GpsTime, Vector3<f64>)>,
+    velocities: Velocities,
     acceleration_mps2: Vector3<f64>,
     /// The last epoch.
     pub(super) tick: u64,
@@ -180,7 +173,7 @@ impl VectorTracking {
             watches: BTreeMap::new(),
             geometry: None,
             contradicting: 0,
-            velocities: VecDeque::new(),
+            velocities: Velocities::default(),
             acceleration_mps2: Vector3::zeros(),
             tick: around.tick,
             started: solution.gps_time(),
@@ -250,7 +243,10 @@ impl VectorTracking {
     ) -> Result<Epoch, ReceiverError> {
         let to = self.state().gps_time(around.receive_time);
         let interval_s = to - self.state().time;
-        self.acceleration_mps2 = self.mean_acceleration();
+        let measured = self.fixed == self.state().time;
+        self.acceleration_mps2 = self
+            .velocities
+            .mean_acceleration_mps2(&self.filter.covariance(), measured);
         self.filter.predict(to)?;
         self.filter
             .accelerate(&self.acceleration_mps2, interval_s)?;
@@ -277,7 +273,7 @@ impl VectorTracking {
             self.outlook = Outlook::Slipped;
             epoch.events.push((None, EventKind::ClockStep { size_m }));
         }
-        self.remember_velocity();
+        self.velocities.remember(self.filter.state());
         self.steer(around, &epoch.members, slots);
         Ok(epoch)
     }
@@ -329,33 +325,6 @@ impl VectorTracking {
             range_rate_mps: raw.range_rate_mps + change_mps,
             ..raw
         }
-    }
-
-    /// Mean acceleration of the receiver over the last epochs, ECEF, m/s^2, as far as it stands out of
-    /// the noise of velocities; none where the last epoch was not measured.
-    fn mean_acceleration(&self) -> Vector3<f64> {
-        let measured = self.fixed == self.state().time;
-        let Some((since, velocity_mps)) = self.velocities.front().filter(|_| measured) else {
-            return Vector3::zeros();
-        };
-        let span_s = self.state().time - *since;
-        if span_s < ACCELERATION_SPAN_S / 2.0 {
-            return Vector3::zeros();
-        }
-        let mean = (self.state().velocity_ecef_mps - velocity_mps) / span_s;
-        let covariance = self.filter.covariance();
-        let variance: f64 = [1, 3, 5].iter().map(|i| covariance[(*i, *i)]).sum();
-        let noise = 2.0 * variance / (span_s * span_s);
-        mean * (1.0 - SIGNIFICANT_SIGMAS2 * noise / mean.norm_squared()).max(0.0)
-    }
-
-    /// Keeps the velocities that [`Self::mean_acceleration`] rests on.
-    fn remember_velocity(&mut self) {
-        let state = *self.state();
-        self.velocities
-            .push_back((state.time, state.velocity_ecef_mps));
-        self.velocities
-            .retain(|(time, _)| state.time - *time <= ACCELERATION_SPAN_S);
     }
 
     fn watch(&mut self, satellite: SatelliteId) -> &mut Watch {
@@ -410,20 +379,6 @@ impl VectorTracking {
         if (position / 3.0 + covariance[(6, 6)]).sqrt() > LOST_M {
             self.outlook = Outlook::Lost;
         }
-        Ok(())
-    }
-
-    /// Follows a step of the receiver's clock.
-    fn step_clock(&mut self, step: &ClockStep, epoch: &mut Epoch) -> Result<(), ReceiverError> {
-        let mut state = *self.state();
-        let mut covariance = self.filter.covariance();
-        state.clock_bias_m += step.size_m;
-        covariance[(6, 6)] += step.variance_m2;
-        self.filter = filter(state, covariance, &self.model, &self.settings)?;
-        let kind = EventKind::ClockStep {
-            size_m: step.size_m,
-        };
-        epoch.events.push((None, kind));
         Ok(())
     }
 
@@ -505,55 +460,8 @@ impl VectorTracking {
         }
     }
 
-    /// Starts anew from least squares where that is consistent.
-    fn reset(
-        &mut self,
-        measurements: &[Measurement],
-        channels: usize,
-        epoch: &mut Epoch,
-    ) -> Result<(), ReceiverError> {
-        let settings = IntegritySettings {
-            most_faults: MOST_FAULTS,
-            ..IntegritySettings::default()
-        };
-        let start = &self.state().position_ecef_m;
-        let solved = integrity::solve(measurements, &self.model, start, &settings);
-        self.faults.clear();
-        let solved = solved.ok().map(|assured| assured.solution);
-        let consistent = |s: &Solution| s.consistency == Consistency::Passed;
-        let Some(solution) = solved.filter(consistent) else {
-            self.outlook = Outlook::Contradicted;
-            return Ok(());
-        };
-        let kind = EventKind::FilterReset { channels };
-        epoch.events.push((None, kind));
-        self.filter = from_solution(&solution, measurements, &self.model, &self.settings)?;
-        self.watches.clear();
-        self.velocities.clear();
-        Ok(())
-    }
-
     /// Whether the position rests on measurements of this epoch or shortly before.
     pub(super) fn is_fixed(&self) -> bool {
         self.state().time - self.fixed < STALE_S
-    }
-
-    /// Takes another model of the delays, and moves to where it puts the same pseudoranges.
-    fn remodel(
-        &mut self,
-        model: MeasurementModel,
-        measurements: &[Measurement],
-    ) -> Result<(), ReceiverError> {
-        let covariance = self.filter.covariance();
-        let before = self.filter.innovations(measurements)?;
-        self.model = model;
-        self.filter = filter(*self.state(), covariance, &model, &self.settings)?;
-        if let Ok(shift) = self.filter.innovations(measurements)?.shift_from(&before) {
-            let mut state = *self.state();
-            state.position_ecef_m += shift.xyz();
-            state.clock_bias_m += shift.w;
-            self.filter = filter(state, covariance, &model, &self.settings)?;
-        }
-        Ok(())
     }
 }
