@@ -22,7 +22,7 @@ use crate::record::Source;
 /// Travel time assumed before the first fix, s: the middle between zenith and horizon.
 const TYPICAL_TRAVEL_S: f64 = 0.075;
 /// Chance of leaving out a good satellite at one epoch.
-pub(super) const EXCLUSION_FALSE_ALARM: f64 = 1e-5;
+const EXCLUSION_FALSE_ALARM: f64 = 1e-5;
 /// A coarse time this good, s, tells which bit boundary is which (10 ms is half a bit).
 const BIT_SAFE_SIGMA_S: f64 = 2.5e-3;
 /// Bit boundaries of all satellites agree to this with a position good to 100 km, s.
