@@ -25,14 +25,14 @@ const SIGNIFICANT: f64 = 9.0;
 #[derive(Debug)]
 enum Monitor {
     Particle(Box<ParticleMonitor>),
-    Glr(GlrMonitor),
+    Glr(Box<GlrMonitor>),
 }
 
 impl Monitor {
     fn any(&mut self) -> &mut dyn IntegrityMonitor {
         match self {
             Self::Particle(monitor) => monitor.as_mut(),
-            Self::Glr(monitor) => monitor,
+            Self::Glr(monitor) => monitor.as_mut(),
         }
     }
 
@@ -77,7 +77,9 @@ impl Monitored {
         };
         let monitor = match raim {
             Raim::None | Raim::LeastSquares(_) => return Ok(None),
-            Raim::LikelihoodRatio(_) => Monitor::Glr(GlrMonitor::new(GlrParameters::default())?),
+            Raim::LikelihoodRatio(_) => {
+                Monitor::Glr(Box::new(GlrMonitor::new(GlrParameters::default())?))
+            }
             Raim::Particles => particle(Movement::Bootstrap)?,
             Raim::Swarm => particle(Movement::Swarm(SwarmSettings::default()))?,
         };
