@@ -275,7 +275,6 @@ fn the_kinematic_filter_goes_through_all_of_the_city() {
             unprotected += usize::from(is_beyond);
         }
     }
-    eprintln!("{beyond} beyond 99 %; {unprotected} of {stated} beyond their protection levels");
     // Errors last for minutes here, so that the count scatters: five times the expectation.
     assert!(beyond * 20 <= URBAN_EPOCHS, "{beyond}");
     assert!(
