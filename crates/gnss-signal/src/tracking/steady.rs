@@ -123,29 +123,15 @@ impl Steady {
         settings: TrackingSettings,
         periods_into_bit: u8,
     ) -> Self {
+        let bit_periods = bit_periods(&nco);
         let bit_edge = nco.code_period - i64::from(periods_into_bit);
         // Periods are counted from a bit's beginning, and never below zero.
-        nco.code_period += bit_periods(&nco);
-        Self::steered(nco, settings, bit_edge, Presence::absent())
-    }
-
-    /// Tracking of a signal that navigation steers, `bit_edge` a period that begins a bit.
-    pub(super) fn steered(
-        nco: Nco,
-        settings: TrackingSettings,
-        bit_edge: i64,
-        presence: Presence,
-    ) -> Self {
-        let lock = if presence.is_present() {
-            Lock::Code
-        } else {
-            Lock::Lost
-        };
+        nco.code_period += bit_periods;
         Self {
-            bit_edge: bit_edge.rem_euclid(bit_periods(&nco)),
-            helm: Helm::Navigation(Box::new(Steered::new(presence))),
-            lock,
-            ..Self::new(nco, settings, presence.cn0_hz(), 1.0)
+            bit_edge: bit_edge.rem_euclid(bit_periods),
+            helm: Helm::Navigation(Box::new(Steered::new(Presence::absent()))),
+            lock: Lock::Lost,
+            ..Self::new(nco, settings, 0.0, 1.0)
         }
     }
 

@@ -64,12 +64,11 @@ fn they_are_those_of_a_filter_that_has_heard_the_others() {
             rate.value,
             rate.variance,
         ];
-        for (found, expected) in found.iter().zip(expected) {
-            // The state moves by metres: ranges of 2e7 m bend by 1e-6 m, and round to 4e-9 m.
-            assert!(
-                (found - expected).abs() < 1e-4 * expected.abs().max(0.1),
-                "{found} {expected}"
-            );
+        // The state moves by a metre or two: ranges of 2e7 m bend by 1e-6 m, and round to 4e-9 m; range rates
+        // depend on the position by 2e-4 1/s, which their rows leave out.
+        let tolerances = [1e-4, 1e-4, 5e-4, 1e-4];
+        for ((found, expected), tolerance) in found.iter().zip(expected).zip(tolerances) {
+            assert!((found - expected).abs() < tolerance, "{found} {expected}");
         }
     }
 }

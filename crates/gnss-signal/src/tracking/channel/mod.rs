@@ -135,7 +135,7 @@ impl Channel {
     }
 
     /// As [`Self::steer`], and before the bit boundaries are known too. The channel then measures over
-    /// code periods until it is released, and goes on from there, not from its first sample.
+    /// code periods until it is released.
     pub fn steer_early(&mut self, steering: &Steering) -> bool {
         if let Stage::PullIn(pull_in) = &mut self.stage {
             pull_in.steer(steering);

@@ -10,7 +10,6 @@ use num_complex::Complex64;
 use super::super::discriminator::EarlyPromptLate;
 use super::super::epoch::ChannelEpoch;
 use super::super::nco::Nco;
-use super::super::presence::Presence;
 use super::super::pull_in::{PullInEstimate, Stretch};
 use super::super::steady::Steady;
 use super::super::steered::Steering;
@@ -83,8 +82,8 @@ impl PullIn {
         });
     }
 
-    /// Navigation no longer steers: tracking goes on from here where the bit boundaries are known, the code
-    /// to `code_variance_chips2`; else a new stretch begins.
+    /// Navigation no longer steers: tracking begins with the first whole bit where the boundaries are known,
+    /// the code to `code_variance_chips2`; else a new stretch begins here.
     pub(super) fn release(
         &mut self,
         settings: TrackingSettings,
@@ -96,11 +95,14 @@ impl PullIn {
             self.begin_at(self.nco);
             return None;
         };
-        let bit_edge = self.start.nearest_period() + i64::from(edge);
-        let presence = Presence::known(found.cn0_hz);
-        let mut steady = Steady::steered(self.nco, settings, bit_edge, presence);
-        steady.release(code_variance_chips2);
-        Some(steady)
+        let start = self.steered_start(&found);
+        let nco = self.at_first_bit(start, edge);
+        Some(Steady::new(
+            nco,
+            settings,
+            found.cn0_hz,
+            code_variance_chips2,
+        ))
     }
 
     /// The next period.
@@ -168,11 +170,28 @@ impl PullIn {
     ///
     /// The open-loop replica ran at another code rate: the code offset holds in the middle.
     fn corrected_start(&self, found: &PullInEstimate) -> Nco {
-        let mut nco = self.start;
-        nco.doppler_hz += found.doppler_offset_hz;
+        let mut nco = self.corrected_carrier(found);
         let slip_hz = nco.code_rate_hz() - self.start.code_rate_hz();
         let half_s = self.stretch.len() as f64 / 2.0 * self.period_s();
         nco.shift_code(found.code_offset_chips - slip_hz * half_s);
+        nco
+    }
+
+    /// The oscillators at the start, from where navigation has the code now.
+    fn steered_start(&self, found: &PullInEstimate) -> Nco {
+        let mut nco = self.corrected_carrier(found);
+        let mut now = nco;
+        now.advance_to(self.nco.tick);
+        let periods = (self.nco.code_period - now.code_period) as f64;
+        let ahead = self.nco.code_phase_chips - now.code_phase_chips;
+        nco.shift_code(periods * self.nco.code_length_chips() + ahead);
+        nco
+    }
+
+    /// The oscillators at the start with the carrier of the estimate.
+    fn corrected_carrier(&self, found: &PullInEstimate) -> Nco {
+        let mut nco = self.start;
+        nco.doppler_hz += found.doppler_offset_hz;
         let to_start = found.doppler_offset_hz * self.period_s() / 2.0;
         nco.carrier_phase_cycles =
             (nco.carrier_phase_cycles + found.phase_offset_cycles - to_start).rem_euclid(1.0);
@@ -181,15 +200,20 @@ impl PullIn {
 
     /// Tracking from the first whole bit on.
     fn steady(&self, found: &PullInEstimate, edge: u32, settings: TrackingSettings) -> Steady {
+        let nco = self.at_first_bit(self.corrected_start(found), edge);
+        let length_s = self.stretch.len() as f64 * self.period_s();
+        let variance = code_variance_chips2(found.cn0_hz, length_s, settings.spacing_chips);
+        Steady::new(nco, settings, found.cn0_hz, variance)
+    }
+
+    /// `nco`, which stands at the start, at the first bit: `edge` periods later.
+    fn at_first_bit(&self, mut nco: Nco, edge: u32) -> Nco {
         let edge = self.start.nearest_period() + i64::from(edge);
-        let mut nco = self.corrected_start(found);
         if edge > nco.nearest_period() {
             nco.advance_to(nco.tick_of_period(edge));
         }
         nco.doppler_cycles = 0.0;
-        let length_s = self.stretch.len() as f64 * self.period_s();
-        let variance = code_variance_chips2(found.cn0_hz, length_s, settings.spacing_chips);
-        Steady::new(nco, settings, found.cn0_hz, variance)
+        nco
     }
 
     fn bit_sync(&self, found: &PullInEstimate, spacing_chips: f64) -> BitSync {
