@@ -109,7 +109,7 @@ fn draw_chart(area: &Area<'_>, chart: &Chart) -> Drawn<()> {
         .x_desc(chart.x)
         .y_desc(chart.y)
         .x_label_formatter(&|x| format!("{x:.0}"))
-        .y_label_formatter(&|y| format!("{y:.digits$}"))
+        .y_label_formatter(&|y| without_sign_of_zero(format!("{y:.digits$}")))
         .light_line_style(BLACK.mix(0.05))
         .bold_line_style(BLACK.mix(0.12))
         .draw()?;
@@ -174,6 +174,14 @@ fn digits(span: f64) -> usize {
     (1.0 - span.log10().floor()).clamp(0.0, 4.0) as usize
 }
 
+/// The text of a number, where it is zero without a minus sign that rounding left.
+fn without_sign_of_zero(text: String) -> String {
+    match text.strip_prefix('-') {
+        Some(zero) if zero.chars().all(|c| c == '0' || c == '.') => zero.to_owned(),
+        _ => text,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -206,6 +214,12 @@ mod tests {
         for text in ["Figure 1", "Error", "time (s)", "error (m)", "ours"] {
             assert!(svg.contains(text), "{text}");
         }
+    }
+
+    #[test]
+    fn zero_has_no_sign() {
+        let labels = ["-0.00", "0.00", "-0.01"].map(|t| without_sign_of_zero(t.to_owned()));
+        assert_eq!(labels, ["0.00", "0.00", "-0.01"]);
     }
 
     #[test]
