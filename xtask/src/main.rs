@@ -149,7 +149,7 @@ enum Validation {
         #[arg(long, value_name = "DIR", default_value = "assets/models")]
         models: PathBuf,
         /// Healthy channel-hours: thresholds are found in one half and false alarms counted in the other
-        #[arg(long, value_name = "H", default_value_t = 2000.0)]
+        #[arg(long, value_name = "H", default_value_t = 2200.0)]
         hours: f64,
         /// Scenarios with faults
         #[arg(long, value_name = "N", default_value_t = 400, value_parser = clap::value_parser!(u32).range(40..))]

@@ -29,6 +29,9 @@ const WINDOW: usize = 50;
 /// Scenarios learned from, that the cut between windows is found beside.
 const LEARNED_FROM: u32 = 200;
 
+/// Channel-hours in which a rate of 0.01 an hour shows: ten false alarms.
+const LEAST_CHANNEL_HOURS: f64 = 1000.0;
+
 /// One monitor.
 #[derive(Debug, Clone)]
 struct Subject {
@@ -145,12 +148,17 @@ impl Table {
         Ok(())
     }
 
-    /// Whether every rate of false alarms is one that the stated rate allows.
+    /// Whether every rate of false alarms is one that the stated rate allows, by enough hours to tell.
     #[must_use]
     pub fn holds(&self) -> bool {
-        self.rows
-            .iter()
-            .all(|row| row.false_alarms.low <= FALSE_ALARMS_PER_HOUR)
+        let allows = |row: &Row| row.false_alarms.low <= FALSE_ALARMS_PER_HOUR;
+        self.has_enough_hours() && self.rows.iter().all(allows)
+    }
+
+    /// Whether false alarms were counted long enough to be seen at the stated rate.
+    fn has_enough_hours(&self) -> bool {
+        let enough = |row: &Row| row.point.channel_hours >= LEAST_CHANNEL_HOURS;
+        self.rows.iter().all(enough)
     }
 }
 
@@ -230,6 +238,12 @@ impl fmt::Display for Table {
                 write!(f, " {class} dB-Hz {:.3}", accuracy.value())?;
             }
             writeln!(f, " |")?;
+        }
+        if !self.has_enough_hours() {
+            return write!(
+                f,
+                "\nthe stated rate of false alarms is not shown: that takes {LEAST_CHANNEL_HOURS} channel-hours in each half"
+            );
         }
         write!(
             f,
