@@ -37,7 +37,7 @@ mod tests {
     use super::*;
     use crate::pipeline::VectorSettings;
 
-    /// A healthy channel as the receiver shows it: the prompt power is that of 10 ms within 0.8 dB.
+    /// A healthy channel as the receiver shows it: C/N0 of an integration within 0.8 dB.
     fn healthy(random: &mut ChaCha8Rng) -> ChannelStep {
         let mut normal = || random.sample::<f64, _>(StandardNormal);
         let innovation = Innovation {
@@ -51,7 +51,7 @@ mod tests {
             innovation,
             given_others: innovation,
             cn0_dbhz: 42.0 + 0.1 * normal(),
-            prompt_power: 0.01 * 10_f64.powf(4.2 + 0.08 * normal()),
+            cn0_now_hz: 10_f64.powf(4.2 + 0.08 * normal()),
         }
     }
 

@@ -50,10 +50,10 @@ pub struct Which {
     name: String,
     /// Folder of the results
     #[arg(long, value_name = "DIR")]
-    out: PathBuf,
+    pub(crate) out: PathBuf,
     /// Level at which signals are made
     #[arg(long, value_enum, default_value = "if")]
-    level: Level,
+    pub(crate) level: Level,
     /// Seed in place of the scenario's
     #[arg(long, value_name = "N")]
     scenario_seed: Option<u64>,
@@ -63,7 +63,7 @@ pub struct Which {
 }
 
 impl Which {
-    fn scenario(&self) -> Result<Scenario> {
+    pub(crate) fn scenario(&self) -> Result<Scenario> {
         let mut file = catalogue::find(&self.name)?;
         if !self.overrides.is_empty() {
             file = file.with(&self.overrides)?;

@@ -10,11 +10,15 @@ use clap::ValueEnum;
 use fault_ml::learned::{Dataset, LearnedModel, ModelKind, read_csv, write_csv};
 use serde_json::json;
 
-use super::fit::{Recipe, with_evidence};
-use super::harvest::{Product, Unwatched, harvest};
+use super::fit::{FALSE_ALARMS_PER_HOUR, Recipe, with_evidence};
+use super::harvest::{Product, Unwatched, harvest, labelled_steps};
 use super::plan::{KINDS, Plan, Series};
+use super::quiet;
+use crate::scenario::command::Which;
 use crate::scenario::make::Level;
 
+/// Scenarios learned from.
+pub const RUNS: u32 = 400;
 /// Scenarios that training stops by, and calibration and evidence are chosen by, for each that is learned from.
 const VALIDATION_SHARE: f64 = 0.4;
 /// Healthy channel-hours of the first threshold.
@@ -69,7 +73,11 @@ pub fn train(trained: Trained, training: &Dataset, runs: u32) -> Result<LearnedM
     let held_out = harvest(&plans, Level::Correlator, &Product)?;
     let model = Recipe::product(trained.into()).fit(training, &held_out)?;
     let unwatched = harvest(&plans, Level::Correlator, &Unwatched)?;
-    let model = with_evidence(model, &unwatched, CHANNEL_HOURS)?;
+    let numbers = 0..quiet::runs(CHANNEL_HOURS);
+    let interval_s = model.card().interval_s;
+    let model = with_evidence(model, &unwatched, FALSE_ALARMS_PER_HOUR, |examinees| {
+        quiet::scores(Series::VALIDATION, numbers.clone(), examinees, interval_s)
+    })?;
     let mut card = model.card().clone();
     card.training["data"] = json!({
         "generator": "xtask::train::plan", "kinds": KINDS, "level": "correlator",
@@ -101,6 +109,20 @@ pub fn write(data: &Dataset, path: &Path) -> Result<()> {
     write_csv(data, &mut file)?;
     file.flush()
         .with_context(|| format!("cannot write {}", path.display()))
+}
+
+/// Receives a scenario and writes what its monitors were shown into `steps.csv`, labelled with the truth; returns
+/// what is to be said.
+///
+/// # Errors
+/// Where the scenario is wrong, the receiver fails or the file cannot be written.
+pub fn export(which: &Which) -> Result<String> {
+    let data = labelled_steps(&which.scenario()?, 0, which.level, &Unwatched)?;
+    let folder = &which.out;
+    fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
+    let path = folder.join("steps.csv");
+    write(&data, &path)?;
+    Ok(format!("{} steps are in {}\n", data.steps(), path.display()))
 }
 
 /// Writes weights and card of `model` into `folder`, named after the kind.

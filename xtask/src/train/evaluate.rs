@@ -169,6 +169,16 @@ pub fn best_cut(scores: &[(f64, bool)]) -> f64 {
     best.map_or(0.0, |point| point.threshold)
 }
 
+/// Scores of windows of `data`, drawn as those of an examination, and whether they are of faulty ones.
+pub fn windows(
+    data: &Dataset,
+    scores: &[Vec<Option<f64>>],
+    window: usize,
+) -> impl Iterator<Item = (f64, bool)> {
+    let all = decisions(data, scores, window);
+    all.into_iter().map(|d| (d.score, d.faulty))
+}
+
 fn area_by_fault(
     data: &Dataset,
     scores: &[Vec<Option<f64>>],

@@ -13,14 +13,12 @@ use fault_ml::learned::{
 use serde_json::{Value, json};
 
 use super::evaluate::{OnFault, on_faults};
-use super::plan::Series;
-use super::quiet;
-use super::scoring::{Examinee, add_healthy};
+use super::scoring::Examinee;
 
 /// False alarms of a channel an hour that thresholds are found for.
 pub const FALSE_ALARMS_PER_HOUR: f64 = 0.01;
 /// Offsets of the evidence that are tried, log-odds.
-const OFFSETS: [f64; 4] = [0.0, 1.0, 2.0, 3.0];
+const OFFSETS: [f64; 5] = [0.0, 1.0, 2.0, 3.0, 4.0];
 /// A fault that is not found counts as found after so long, s.
 const MISSED_S: f64 = 10.0;
 /// Windows that the calibration is fitted to.
@@ -60,16 +58,21 @@ impl Recipe {
         let base = Self {
             kind,
             features: FeatureSet::Full,
-            window: 5,
+            // The features remember what was: a window of more steps only hides it among more numbers.
+            window: 1,
             mode: Mode::Window,
-            decide_every: 5,
+            decide_every: 1,
             interval_s: 0.02,
             windows: 4000,
-            length: 5,
-            svm: SvmTraining::default(),
+            length: 1,
+            svm: SvmTraining {
+                cost: 1.0,
+                ..SvmTraining::default()
+            },
             lstm: LstmTraining {
-                epochs: 12,
-                patience: 4,
+                epochs: 8,
+                patience: 3,
+                learning_rate: 3e-3,
                 ..LstmTraining::default()
             },
             seed: 1,
@@ -79,8 +82,7 @@ impl Recipe {
             ModelKind::Lstm => Self {
                 window: 50,
                 mode: Mode::Streaming,
-                decide_every: 1,
-                windows: 5000,
+                windows: 20_000,
                 length: 100,
                 ..base
             },
@@ -186,34 +188,17 @@ pub fn calibrated(model: LearnedModel, held_out: &Dataset) -> Result<LearnedMode
     Ok(model.with_card(card)?)
 }
 
-/// `model` with the threshold that the healthy channels of held-out scenarios give, every step by its own.
-///
-/// # Errors
-/// Where they hold too little.
-pub fn with_threshold(
-    model: LearnedModel,
-    held_out: &Dataset,
-    per_hour: f64,
-) -> Result<LearnedModel> {
-    let mut card = model.card().clone();
-    let scores = Examinee::Learned(Arc::new(model.clone())).all_scores(held_out)?;
-    let mut healthy = HealthyScores::default();
-    add_healthy(&mut healthy, held_out, &scores, card.interval_s);
-    card.operating_point = healthy.operating_point(per_hour)?;
-    Ok(model.with_card(card)?)
-}
-
 /// `model` with the offset of its evidence, and the threshold that belongs to it, that find the faults of `held_out`
-/// soonest at [`FALSE_ALARMS_PER_HOUR`]; the thresholds are those of `channel_hours` of other healthy channels.
+/// soonest at `per_hour` false alarms of a channel; `quiet` gives the scores of healthy channels.
 ///
 /// # Errors
 /// Where a run fails or a part is too small.
 pub fn with_evidence(
     model: LearnedModel,
     held_out: &Dataset,
-    channel_hours: f64,
+    per_hour: f64,
+    quiet: impl Fn(&[Examinee]) -> Result<Vec<HealthyScores>>,
 ) -> Result<LearnedModel> {
-    let interval_s = model.card().interval_s;
     let candidates: Vec<LearnedModel> = OFFSETS
         .iter()
         .map(|offset| unbounded(&model, Some(*offset)))
@@ -222,12 +207,11 @@ pub fn with_evidence(
         .into_iter()
         .map(|model| Examinee::Learned(Arc::new(model)))
         .collect();
-    let numbers = 0..quiet::runs(channel_hours);
-    let quiet = quiet::scores(Series::VALIDATION, numbers, &examinees, interval_s)?;
+    let quiet = quiet(&examinees)?;
     let mut best: Option<(f64, Card)> = None;
     let mut tried = Vec::new();
     for ((offset, examinee), healthy) in OFFSETS.iter().zip(&examinees).zip(&quiet) {
-        let point = healthy.operating_point(FALSE_ALARMS_PER_HOUR)?;
+        let point = healthy.operating_point(per_hour)?;
         let faults = on_faults(held_out, &examinee.all_scores(held_out)?, point.threshold);
         let delay_s = mean_delay_s(&faults);
         tried.push(

@@ -65,12 +65,24 @@ pub fn harvest(plans: &[Plan], level: Level, pupil: &impl Pupil) -> Result<Datas
 /// # Errors
 /// As [`harvest`].
 pub fn steps(plan: &Plan, level: Level, pupil: &impl Pupil) -> Result<Dataset> {
-    let scenario = plan.scenario()?;
-    let judged = judged::receive(&scenario, level, &pupil.settings(&scenario))?;
-    let elapsed_s = |time_s| scenario.elapsed_s(time_s);
-    let mut data = labelled(plan.number, &judged.channels, &scenario.accounts, elapsed_s);
+    let mut data = labelled_steps(&plan.scenario()?, plan.number, level, pupil)?;
     for sequence in data.sequences.iter_mut().filter(|s| !s.fault.is_empty()) {
         sequence.fault += plan.severity.suffix();
     }
     Ok(data)
+}
+
+/// Labelled steps of `scenario`, which has a `number` among others.
+///
+/// # Errors
+/// Where the signal cannot be made or the receiver fails.
+pub fn labelled_steps(
+    scenario: &Scenario,
+    number: u32,
+    level: Level,
+    pupil: &impl Pupil,
+) -> Result<Dataset> {
+    let judged = judged::receive(scenario, level, &pupil.settings(scenario))?;
+    let elapsed_s = |time_s| scenario.elapsed_s(time_s);
+    Ok(labelled(number, &judged.channels, &scenario.accounts, elapsed_s))
 }

@@ -5,7 +5,7 @@ use anyhow::Result;
 use fault_ml::learned::lstm::LstmTraining;
 use fault_ml::learned::svm::SvmTraining;
 use fault_ml::learned::{
-    Calibration, Card, Dataset, FORMAT, FeatureSet, LearnedModel, Mode, ModelKind, Network,
+    Calibration, Card, Dataset, FORMAT, FeatureSet, HealthyScores, LearnedModel, Mode, ModelKind, Network,
     OperatingPoint, Split, VERSION, WindowEnd, Windows, choose, cn0_class_dbhz, features,
     healthy_scaler,
 };
@@ -17,8 +17,9 @@ use receiver::pipeline::{MeasurementNoise, Settings};
 use serde_json::json;
 
 use super::evaluate::best_cut;
-use super::fit::{calibrated, with_threshold};
+use super::fit::{calibrated, with_evidence};
 use super::label::labelled;
+use super::scoring::{Examinee, add_healthy};
 use crate::judged;
 use crate::reproduce::jiang2017::receivers::{INTERVAL_S, Variant};
 use crate::scenario::built::Scenario;
@@ -33,23 +34,39 @@ pub const LENGTHS: [usize; 7] = [5, 10, 20, 30, 50, 75, 100];
 const SPACING_CHIPS: f64 = 1.0;
 /// Signal of a run and onset of the blockage, s.
 const DURATION_S: f64 = 19.0;
+/// Signal of a run in which nothing is blocked, s.
+const QUIET_S: f64 = 45.0;
 const ONSET_S: (f64, f64) = (12.0, 15.0);
 /// Every run begins at this C/N0, dB-Hz, and falls to its class between these times, s: below 35 dB-Hz it takes
 /// long before the filter can take over, which is not what is studied.
 const BEGIN_DBHZ: i64 = 45;
 const FALL_S: (f64, f64) = (8.0, 9.0);
 
-/// A scenario of the study: a flight of the papers' with one satellite blocked.
+/// What befalls a flight of the study.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Flight {
+    /// One satellite is blocked.
+    Blocked,
+    /// Nothing.
+    Quiet,
+}
+
+/// A scenario of the study: a flight of the papers'.
 ///
 /// # Errors
 /// Where it cannot be made.
-pub fn scenario(cn0_dbhz: i64, seed: u64) -> Result<Scenario> {
+pub fn scenario(flight: Flight, cn0_dbhz: i64, seed: u64) -> Result<Scenario> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let victims = [7, 8, 24, 17, 19, 11, 20];
     let victim = victims[random.random_range(0..victims.len())];
     let begin_s = random.random_range(ONSET_S.0..ONSET_S.1);
-    let fault =
-        format!("fault=[{{ kind = 'blocked', sat = 'G{victim:02}', begin_s = {begin_s:.3} }}]");
+    let (duration_s, fault) = match flight {
+        Flight::Blocked => (
+            DURATION_S,
+            format!("{{ kind = 'blocked', sat = 'G{victim:02}', begin_s = {begin_s:.3} }}"),
+        ),
+        Flight::Quiet => (QUIET_S, String::new()),
+    };
     let overrides = [
         format!(
             "cn0={{ fixed_dbhz = {cn0_dbhz}, schedule = [[0, {excess}], [{from}, {excess}], [{to}, 0]] }}",
@@ -57,8 +74,8 @@ pub fn scenario(cn0_dbhz: i64, seed: u64) -> Result<Scenario> {
             from = FALL_S.0,
             to = FALL_S.1,
         ),
-        format!("duration_s={DURATION_S:?}"),
-        fault,
+        format!("duration_s={duration_s:?}"),
+        format!("fault=[{fault}]"),
     ];
     Scenario::new(
         &catalogue::find("jiang2017-1")?.with(&overrides)?,
@@ -85,10 +102,10 @@ pub fn settings(scenario: &Scenario, cn0_dbhz: i64) -> Settings {
 ///
 /// # Errors
 /// Where a run fails.
-pub fn harvest(seeds: usize, first_seed: u64, level: Level) -> Result<Dataset> {
+pub fn harvest(flight: Flight, seeds: usize, first_seed: u64, level: Level) -> Result<Dataset> {
     let all = judged::in_parallel(CLASSES_DBHZ.len() * seeds, |number| {
         let cn0_dbhz = CLASSES_DBHZ[number % CLASSES_DBHZ.len()];
-        let scenario = scenario(cn0_dbhz, first_seed + number as u64)?;
+        let scenario = scenario(flight, cn0_dbhz, first_seed + number as u64)?;
         let judged = judged::receive(&scenario, level, &settings(&scenario, cn0_dbhz))?;
         let elapsed_s = |time_s| scenario.elapsed_s(time_s);
         let mut data = labelled(
@@ -157,30 +174,56 @@ pub const SVM_LENGTH: usize = 30;
 pub const LEARNED_FROM: u64 = 2_000_001;
 /// See [`LEARNED_FROM`].
 pub const JUDGED_BY: u64 = 1_000_001;
+/// See [`LEARNED_FROM`].
+const QUIET_FROM: u64 = 3_000_001;
 /// Part of what is learned from that is held out, to stop by and for thresholds.
 const HELD_OUT: f64 = 0.25;
 /// False alarms of a channel an hour in a flight.
 const FLIGHT_ALARMS_PER_HOUR: f64 = 0.1;
 
-/// What is learned from: `seeds` runs of every class at the correlator level, a quarter of them held out.
+/// What is learned from.
+#[derive(Debug, Clone)]
+pub struct Lessons {
+    /// Flights with a blockage, some of them held out.
+    pub split: Split,
+    /// Flights without one, that thresholds are found by.
+    quiet: Dataset,
+}
+
+/// `seeds` runs of every class at the correlator level, a quarter of them held out, and a quarter as many in which
+/// nothing is blocked.
 ///
 /// # Errors
 /// Where a run fails.
-pub fn lessons(seeds: usize) -> Result<Split> {
-    Ok(harvest(seeds, LEARNED_FROM, Level::Correlator)?.split(HELD_OUT, 0.0, 1))
+pub fn lessons(seeds: usize) -> Result<Lessons> {
+    let level = Level::Correlator;
+    let blocked = harvest(Flight::Blocked, seeds, LEARNED_FROM, level)?;
+    Ok(Lessons {
+        split: blocked.split(HELD_OUT, 0.0, 1),
+        quiet: harvest(Flight::Quiet, seeds.div_ceil(4), QUIET_FROM, level)?,
+    })
 }
 
 /// A monitor of the paper's own number of innovations, ready to fly.
 ///
 /// # Errors
 /// Where there is too little to learn from.
-pub fn monitor(kind: ModelKind, split: &Split) -> Result<LearnedModel> {
+pub fn monitor(kind: ModelKind, lessons: &Lessons) -> Result<LearnedModel> {
     let length = match kind {
         ModelKind::Svm => SVM_LENGTH,
         ModelKind::Lstm => LSTM_LENGTH,
     };
-    let model = calibrated(fit(kind, length, split, 1)?, &split.validation)?;
-    with_threshold(model, &split.validation, FLIGHT_ALARMS_PER_HOUR)
+    let (held_out, quiet) = (&lessons.split.validation, &lessons.quiet);
+    let model = calibrated(fit(kind, length, &lessons.split, 1)?, held_out)?;
+    with_evidence(model, held_out, FLIGHT_ALARMS_PER_HOUR, |examinees| {
+        let scores = |examinee: &Examinee| {
+            let mut healthy = HealthyScores::default();
+            let scores = examinee.all_scores(quiet)?;
+            add_healthy(&mut healthy, quiet, &scores, INTERVAL_S);
+            Ok(healthy)
+        };
+        examinees.iter().map(scores).collect()
+    })
 }
 
 /// Trains a model of `kind` on windows of `length` raw innovations.

@@ -2,6 +2,7 @@
 
 pub mod consistency;
 pub mod front_ends;
+pub mod generalisation;
 pub mod levels;
 pub mod monitors;
 pub mod sensitivity;

@@ -8,7 +8,7 @@ use crate::Innovation;
 
 /// Columns.
 const HEADER: &str = "scenario,satellite,fault,time_s,code_m,code_sigma_m,rate_mps,rate_sigma_mps,\
-given_code_m,given_code_sigma_m,given_rate_mps,given_rate_sigma_mps,cn0_dbhz,prompt_power,label";
+given_code_m,given_code_sigma_m,given_rate_mps,given_rate_sigma_mps,cn0_dbhz,cn0_now_hz,label";
 /// Number of them.
 const COLUMNS: usize = 15;
 /// Steps farther apart than this belong to different sequences, s.
@@ -41,7 +41,7 @@ pub fn write_csv(data: &Dataset, out: &mut impl Write) -> Result<(), LearnedErro
                 }
             }
             let label = u8::from(labelled.label.is_faulty());
-            writeln!(out, "{},{},{label}", step.cn0_dbhz, step.prompt_power)?;
+            writeln!(out, "{},{},{label}", step.cn0_dbhz, step.cn0_now_hz)?;
         }
     }
     Ok(())
@@ -153,7 +153,7 @@ fn parse(number: usize, line: &str) -> Result<Row<'_>, LearnedError> {
             [given_c, given_cs, given_r, given_rs],
         )?,
         cn0_dbhz: real("cn0_dbhz", cn0)?,
-        prompt_power: real("prompt_power", power)?,
+        cn0_now_hz: real("cn0_now_hz", power)?,
     };
     let time_s = real("time_s", time)?;
     let labelled = LabelledStep {

@@ -29,8 +29,7 @@ pub enum FeatureSet {
     Paper,
     /// Both given the other channels, over their predicted deviations; running means of them and of their squares
     /// over their own deviations (a small error that lasts stands out there); C/N0, the same against what the
-    /// channel is used to, and the power of the last prompt sum against what C/N0 lets expect, which answers
-    /// at once where C/N0 is smoothed. Of large numbers the inverse hyperbolic sine: they keep their order
+    /// channel is used to, and that of the last integration against the smoothed one, which answers at once. Of large numbers the inverse hyperbolic sine: they keep their order
     /// without drowning the others.
     Full,
 }
@@ -200,7 +199,7 @@ fn normalised((value, sigma): (f64, f64)) -> f64 {
     (value / sigma).clamp(-FARTHEST_SIGMAS, FARTHEST_SIGMAS)
 }
 
-/// C/N0 about 40 dB-Hz and the prompt power, both in tens of decibels.
+/// C/N0 about 40 dB-Hz, and that of the last integration against it, both in tens of decibels.
 fn strength(step: &ChannelStep) -> Result<(f64, f64), MonitorError> {
     within(
         "C/N0 (dB-Hz)",
@@ -208,10 +207,15 @@ fn strength(step: &ChannelStep) -> Result<(f64, f64), MonitorError> {
         (-100.0, 200.0),
         "-100 to 200",
     )?;
-    within("prompt power", step.prompt_power, (0.0, 1e30), "0 to 1e30")?;
+    within(
+        "C/N0 now (Hz)",
+        step.cn0_now_hz,
+        (-1e12, 1e12),
+        "a number up to 1e12",
+    )?;
     let cn0 = (step.cn0_dbhz - CN0_MIDDLE_DBHZ) / DECADE_DB;
     // Of a sum of 20 ms at 40 dB-Hz: 200. One more keeps the logarithm of nothing finite.
-    let power = ((step.prompt_power + 1.0) / 200.0).log10();
+    let power = ((0.02 * step.cn0_now_hz.max(0.0) + 1.0) / 200.0).log10();
     Ok((cn0, power - cn0))
 }
 
@@ -302,7 +306,7 @@ mod tests {
                 "deviation of an innovation is 0",
             ),
             (|s| s.cn0_dbhz = f64::NAN, "C/N0 (dB-Hz) is NaN"),
-            (|s| s.prompt_power = -1.0, "prompt power is -1"),
+            (|s| s.cn0_now_hz = f64::NAN, "C/N0 now (Hz) is NaN"),
         ];
         for (spoil, text) in spoil {
             let mut step = ChannelStep::normal(1, 0.0, 0.0);

@@ -13,8 +13,8 @@ pub struct ChannelStep {
     pub given_others: Innovation,
     /// C/N0, smoothed, dB-Hz.
     pub cn0_dbhz: f64,
-    /// Power of the last prompt sum over that of its noise, a ratio.
-    pub prompt_power: f64,
+    /// C/N0 by the last integration alone, Hz; noise may take it below zero.
+    pub cn0_now_hz: f64,
 }
 
 #[cfg(test)]
@@ -32,7 +32,7 @@ impl ChannelStep {
             innovation,
             given_others: innovation,
             cn0_dbhz: 45.0,
-            prompt_power: 600.0,
+            cn0_now_hz: 3e4,
         }
     }
 }

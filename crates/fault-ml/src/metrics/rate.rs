@@ -10,6 +10,8 @@ const OUTSIDE: f64 = 0.025;
 pub struct RateInterval {
     /// Events counted.
     pub events: usize,
+    /// Hours they were counted in.
+    pub hours: f64,
     /// Events an hour.
     pub per_hour: f64,
     /// Lower end.
@@ -30,6 +32,7 @@ impl RateInterval {
         let count = events as f64;
         Self {
             events,
+            hours,
             per_hour: count / hours,
             low: quantile(2.0 * count, OUTSIDE) / hours,
             high: quantile(2.0 * count + 2.0, 1.0 - OUTSIDE) / hours,

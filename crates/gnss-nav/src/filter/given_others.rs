@@ -18,6 +18,14 @@ pub struct Deviation {
     pub variance: f64,
 }
 
+impl Deviation {
+    /// Square of the value over its variance.
+    #[must_use]
+    pub const fn normalised_squared(&self) -> f64 {
+        self.value * self.value / self.variance
+    }
+}
+
 /// Both measurements of a satellite, given those of the others.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GivenOthers {

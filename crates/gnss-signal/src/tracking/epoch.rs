@@ -33,6 +33,9 @@ pub struct ChannelEpoch {
     pub phase_slipped: bool,
     /// C/N0, smoothed, dB-Hz.
     pub cn0_dbhz: f64,
+    /// C/N0 by the last integration alone, or while it pulls in by the latest ones, Hz; noise may take it below
+    /// zero.
+    pub cn0_now_hz: f64,
     /// What the channel sees.
     pub lock: Lock,
     /// Prompt sum of the last integration over the noise deviation.

@@ -54,6 +54,7 @@ pub(super) struct Steady {
     detector: LockDetector,
     lock: Lock,
     cn0_hz: f64,
+    cn0_now_hz: f64,
     previous_prompt: Option<Complex64>,
     bit: Bit,
     pre_filter: PreFilter,
@@ -105,6 +106,7 @@ impl Steady {
             detector: LockDetector::new(false),
             lock: Lock::Code,
             cn0_hz,
+            cn0_now_hz: cn0_hz,
             previous_prompt: None,
             bit: Bit::default(),
             pre_filter: PreFilter::default(),
@@ -316,6 +318,7 @@ impl Steady {
 
     fn watch_power(&mut self, prompt: Complex64, noise: f64, interval_s: f64, tick: u64) {
         let now = cn0::against_noise_floor(prompt, noise, interval_s);
+        self.cn0_now_hz = now;
         self.watch_fade(now, tick);
         if !self.is_steered() {
             self.cn0_hz += (interval_s / CN0_TIME_S).min(1.0) * (now - self.cn0_hz);
@@ -442,6 +445,7 @@ impl Steady {
             doppler_cycles: sign * at.doppler_cycles,
             phase_slipped: std::mem::replace(&mut self.slipped, self.lock != Lock::Carrier),
             cn0_dbhz: cn0::dbhz(self.cn0_hz),
+            cn0_now_hz: self.cn0_now_hz,
             lock: self.lock,
             prompt: self.prompt,
             code_error_chips: measured.code_error_chips,

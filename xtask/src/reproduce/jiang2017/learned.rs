@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use anyhow::{Context, Result};
-use fault_ml::learned::{LearnedModel, ModelKind, Split};
+use fault_ml::learned::{LearnedModel, ModelKind};
 use receiver::models::default_model;
 use receiver::pipeline::{Policy, Settings, VectorSettings};
 
@@ -36,8 +36,8 @@ impl Watched {
     /// # Errors
     /// Where a training fails or a model that comes with the receiver is damaged.
     pub fn all() -> Result<[Self; 4]> {
-        let split = paper::lessons(LESSONS)?;
-        let of_paper = |kind, split: &Split| paper::monitor(kind, split).map(Arc::new);
+        let lessons = paper::lessons(LESSONS)?;
+        let of_paper = |kind| paper::monitor(kind, &lessons).map(Arc::new);
         let new = |key, label, base, model| Self {
             key,
             label,
@@ -49,13 +49,13 @@ impl Watched {
                 "paper_baseline_with_svm",
                 "paper baseline, SVM of 30",
                 Variant::Paper,
-                of_paper(ModelKind::Svm, &split)?,
+                of_paper(ModelKind::Svm)?,
             ),
             new(
                 "paper_baseline_with_lstm",
                 "paper baseline, LSTM of 50",
                 Variant::Paper,
-                of_paper(ModelKind::Lstm, &split)?,
+                of_paper(ModelKind::Lstm)?,
             ),
             new(
                 "product_with_svm",

@@ -13,7 +13,7 @@ use crate::reproduce::jiang2017::receivers::Variant;
 use crate::scenario::built::Scenario;
 use crate::scenario::catalogue;
 use crate::scenario::make::Level;
-use crate::train::paper::{self, Accuracy};
+use crate::train::paper::{self, Accuracy, Lessons};
 
 /// When the satellite is switched off, s, and which.
 pub const OFF_S: f64 = 80.0;
@@ -83,14 +83,15 @@ impl Study {
     /// # Errors
     /// Where a run or a training fails.
     pub fn run(level: Level, seeds: usize, lengths: &[usize], trainings: u64) -> Result<Self> {
-        let split = paper::lessons(seeds)?;
-        let judges = paper::harvest(seeds.div_ceil(2), paper::JUDGED_BY, level)?;
-        let cells = curve(&split, &judges, lengths, trainings)?;
+        let lessons = paper::lessons(seeds)?;
+        let judging = seeds.div_ceil(2);
+        let judges = paper::harvest(paper::Flight::Blocked, judging, paper::JUDGED_BY, level)?;
+        let cells = curve(&lessons.split, &judges, lengths, trainings)?;
         Ok(Self {
             level,
             seeds,
             cells,
-            flights: flights(&split, level)?,
+            flights: flights(&lessons, level)?,
         })
     }
 
@@ -141,12 +142,12 @@ fn settings(scenario: &Scenario, model: Option<LearnedModel>) -> Settings {
     Settings { vector, ..base }
 }
 
-fn flights(split: &Split, level: Level) -> Result<Vec<Flight>> {
+fn flights(lessons: &Lessons, level: Level) -> Result<Vec<Flight>> {
     let scenario = Scenario::new(&catalogue::find("zhu2020")?, None)?;
     let monitors = [
         ("without detection", None),
-        ("LSTM of 50", Some(paper::monitor(ModelKind::Lstm, split)?)),
-        ("SVM of 30", Some(paper::monitor(ModelKind::Svm, split)?)),
+        ("LSTM of 50", Some(paper::monitor(ModelKind::Lstm, lessons)?)),
+        ("SVM of 30", Some(paper::monitor(ModelKind::Svm, lessons)?)),
     ];
     let (labels, models): (Vec<_>, Vec<_>) = monitors.into_iter().unzip();
     let settings: Vec<Settings> = models.into_iter().map(|m| settings(&scenario, m)).collect();

@@ -10,6 +10,7 @@ mod filter;
 mod monitors;
 mod report;
 mod restart;
+mod scatter;
 mod settings;
 mod steering;
 mod watch;
@@ -41,6 +42,7 @@ use acceleration::Velocities;
 use filter::from_solution;
 pub(super) use monitors::Monitor;
 use monitors::deviations;
+use scatter::Scatter;
 pub(super) use report::{change, observations};
 pub use settings::{FilterKind, MeasurementNoise, Policy, VectorSettings};
 pub(super) use steering::steering;
@@ -142,6 +144,7 @@ pub(super) struct VectorTracking {
     model: MeasurementModel,
     monitors: Vec<Monitor>,
     faults: FaultLogic,
+    scatter: Scatter,
     watches: BTreeMap<SatelliteId, Watch>,
     geometry: Option<EpochGeometry>,
     /// Channels whose message tells another time, at the last epoch.
@@ -178,6 +181,7 @@ impl VectorTracking {
             model,
             monitors,
             faults: FaultLogic::new(FaultThresholds::default())?,
+            scatter: Scatter::new(),
             watches: BTreeMap::new(),
             geometry: None,
             contradicting: 0,
@@ -405,7 +409,13 @@ impl VectorTracking {
             let watch = self.watches.get(&satellite);
             watch.is_none_or(|watch| !watch.is_suspended())
         };
-        let given = deviations(innovations, &self.filter.covariance(), believed)?;
+        let given = deviations(
+            innovations,
+            &self.filter.covariance(),
+            &mut self.scatter,
+            self.settings.interval_s,
+            believed,
+        )?;
         for (innovation, given) in innovations.satellites().iter().zip(&given) {
             let satellite = innovation.satellite;
             let mut members = epoch.members.iter_mut();

@@ -8,6 +8,7 @@ use gnss_nav::filter::{
 };
 use gnss_signal::tracking::ChannelEpoch;
 
+use super::scatter::Scatter;
 use crate::ReceiverError;
 
 /// One monitor of a channel.
@@ -55,17 +56,23 @@ const CONTRADICTS_SIGMAS: f64 = 6.0;
 const FEWEST_OTHERS: usize = 5;
 
 /// Every satellite's innovations given those of the others that are `believed` and do not contradict the rest:
-/// one that does would show in the deviations of all.
+/// one that does would show in the deviations of all. Variances are those that `scatter`, which takes this epoch in,
+/// has found.
 pub(super) fn deviations(
     innovations: &Innovations,
     covariance: &Covariance,
+    scatter: &mut Scatter,
+    interval_s: f64,
     believed: impl Fn(SatelliteId) -> bool,
 ) -> Result<Vec<GivenOthers>, ReceiverError> {
     let all = innovations.satellites().iter().map(|s| s.satellite);
     let mut others: Vec<SatelliteId> = all.filter(|s| believed(*s)).collect();
+    let given_by = |others: &[_]| innovations.given_others(covariance, |s| others.contains(&s));
+    let mut given = given_by(&others)?;
+    scatter.follow(given.iter().filter(|g| believed(g.satellite)), interval_s);
     loop {
-        let given = innovations.given_others(covariance, |s| others.contains(&s))?;
-        let heard = given.iter().filter(|g| others.contains(&g.satellite));
+        let wide: Vec<_> = given.iter().map(|g| scatter.widened(g)).collect();
+        let heard = wide.iter().filter(|g| others.contains(&g.satellite));
         let farthest = heard.max_by(|a, b| distance2(a).total_cmp(&distance2(b)));
         match farthest {
             Some(farthest)
@@ -74,20 +81,18 @@ pub(super) fn deviations(
             {
                 let contradicts = farthest.satellite;
                 others.retain(|s| *s != contradicts);
+                given = given_by(&others)?;
             }
-            _ => return Ok(given),
+            _ => return Ok(wide),
         }
     }
 }
 
 /// The larger of the normalised deviations, squared.
 fn distance2(given: &GivenOthers) -> f64 {
-    let square = |d: &Deviation| d.value * d.value / d.variance;
-    given
-        .rate
-        .as_ref()
-        .map_or(0.0, square)
-        .max(square(&given.code))
+    let rate = given.rate.as_ref();
+    let rate = rate.map_or(0.0, Deviation::normalised_squared);
+    rate.max(given.code.normalised_squared())
 }
 
 /// What the monitors of a channel are shown of an epoch.
@@ -105,7 +110,7 @@ pub(super) fn step(
         innovation: pair(number(&innovation.code), rate),
         given_others: pair(deviation(&given.code), given_rate),
         cn0_dbhz: epoch.cn0_dbhz,
-        prompt_power: epoch.prompt.norm_sqr(),
+        cn0_now_hz: epoch.cn0_now_hz,
     }
 }
 

@@ -1,0 +1,299 @@
+//! What faults do to the position while a monitor decides who enters the filter.
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::sync::Arc;
+
+use anyhow::{Context, Result};
+use fault_ml::learned::LearnedModel;
+use fault_ml::shape::ShapeSettings;
+use gnss_nav::SatelliteId;
+use receiver::pipeline::{Policy, Settings, ShapeWatching, VectorSettings};
+use receiver::record::{Disposition, Event, EventKind, Status};
+use serde_json::{Value, json};
+
+use crate::judged;
+use crate::reproduce::chart::{BLUE, Chart, GREEN, RED, Series, Stroke, picture};
+use crate::scenario::built::Scenario;
+use crate::scenario::make::Level;
+use crate::train::evaluate::OnFault;
+use crate::train::plan::Plan;
+
+/// An error so many times its stated deviation misleads.
+const MISLEADING: f64 = 4.0;
+/// Epochs before count for nothing: the filter settles, s.
+const SETTLED_S: f64 = 10.0;
+/// Largest error and stated deviation that are drawn, m.
+const DRAWN_M: f64 = 60.0;
+
+/// The receiver as it comes, watched by these and nobody else; what they find is excluded.
+#[derive(Debug, Clone, Default)]
+pub struct Watch {
+    /// What people read.
+    pub label: &'static str,
+    /// The innovation test.
+    pub innovation: bool,
+    /// The chart on the shape of the correlation.
+    pub shape: bool,
+    /// Trained models.
+    pub learned: Vec<Arc<LearnedModel>>,
+}
+
+impl Watch {
+    fn settings(&self, scenario: &Scenario) -> Settings {
+        let vector = VectorSettings::default();
+        let monitor = vector.monitor.filter(|_| self.innovation);
+        let policy = Policy::Exclude;
+        let shape = self.shape.then(|| ShapeWatching {
+            chart: ShapeSettings::default(),
+            policy,
+        });
+        Settings {
+            shape,
+            vector: Some(VectorSettings {
+                monitor,
+                learned: self.learned.clone(),
+                policy,
+                ..vector
+            }),
+            ..judged::settings(scenario)
+        }
+    }
+}
+
+/// A horizontal error and what the receiver says of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Epoch {
+    error_m: f64,
+    sigma_m: f64,
+    /// Whether a satellite was left out.
+    alarmed: bool,
+}
+
+impl Epoch {
+    fn misleads(&self) -> bool {
+        !self.alarmed && self.error_m > MISLEADING * self.sigma_m
+    }
+}
+
+/// One run.
+#[derive(Debug, Clone, Default)]
+struct Flown {
+    /// From the onset of the fault on, or all of a healthy run.
+    epochs: Vec<Epoch>,
+    /// The fault, and the time from its onset to the first exclusion of its satellite, s.
+    fault: Option<(String, Option<f64>)>,
+    /// Satellites that nothing befell, excluded before the onset or in a run without a fault.
+    wrong: usize,
+    /// Signal before the onset, s.
+    healthy_s: f64,
+}
+
+/// What came of all runs with one watch.
+#[derive(Debug, Clone)]
+pub struct Consequence {
+    /// Who watched.
+    pub label: &'static str,
+    epochs: Vec<Epoch>,
+    faults: BTreeMap<String, OnFault>,
+    wrong: usize,
+    healthy_s: f64,
+}
+
+/// Flies `plans` with each of `watches`, at the correlator level.
+///
+/// # Errors
+/// Where a run fails.
+pub fn consequences(plans: &[Plan], watches: &[Watch]) -> Result<Vec<Consequence>> {
+    let flown = judged::in_parallel(plans.len(), |number| {
+        let plan = &plans[number];
+        let scenario = plan.scenario()?;
+        let fly = |watch: &Watch| fly(plan, &scenario, watch);
+        watches.iter().map(fly).collect::<Result<Vec<_>>>()
+    })?;
+    let of_watch = |(index, watch): (usize, &Watch)| {
+        let mut all = Consequence {
+            label: watch.label,
+            epochs: Vec::new(),
+            faults: BTreeMap::new(),
+            wrong: 0,
+            healthy_s: 0.0,
+        };
+        for run in &flown {
+            all.add(run.get(index).context("no run")?);
+        }
+        Ok(all)
+    };
+    watches.iter().enumerate().map(of_watch).collect()
+}
+
+fn fly(plan: &Plan, scenario: &Scenario, watch: &Watch) -> Result<Flown> {
+    let judged = judged::receive(scenario, Level::Correlator, &watch.settings(scenario))?;
+    let own = scenario.accounts.iter().find(|a| !a.satellites.is_empty());
+    let begin_s = scenario.accounts.first().map(|a| a.span.begin_s);
+    let onset_s = begin_s.unwrap_or(f64::INFINITY);
+    let mut left_out: BTreeMap<u64, bool> = BTreeMap::new();
+    for channel in &judged.channels {
+        let excluded = channel.disposition == Disposition::Exclude;
+        *left_out.entry(channel.time_s.to_bits()).or_default() |= excluded;
+    }
+    let from_s = begin_s.unwrap_or(SETTLED_S);
+    let told = |e: &&judged::JudgedEpoch| e.pvt.status != Status::Unreliable;
+    let epochs = judged.between(from_s, f64::INFINITY).filter(told);
+    let epochs = epochs.map(|e| Epoch {
+        error_m: e.horizontal_m(),
+        sigma_m: e.pvt.sigma_enu_m[0].hypot(e.pvt.sigma_enu_m[1]),
+        alarmed: left_out
+            .get(&e.pvt.time_s.to_bits())
+            .copied()
+            .unwrap_or(false),
+    });
+    let excluded = |e: &&Event| matches!(e.kind, EventKind::Excluded { .. });
+    let wrong = judged
+        .events
+        .iter()
+        .filter(|e| excluded(e) && e.time_s < onset_s)
+        .count();
+    let fault = own.map(|account| {
+        let victims: &[SatelliteId] = &account.satellites;
+        let found = judged.events.iter().filter(excluded).find(|e| {
+            e.time_s >= onset_s && e.satellite.is_some_and(|s| victims.contains(&s))
+        });
+        let name = account.kind.to_owned() + plan.severity.suffix();
+        (name, found.map(|e| e.time_s - onset_s))
+    });
+    Ok(Flown {
+        epochs: epochs.collect(),
+        fault,
+        wrong,
+        healthy_s: onset_s.min(plan.duration_s) - SETTLED_S,
+    })
+}
+
+impl Consequence {
+    fn add(&mut self, run: &Flown) {
+        self.epochs.extend(&run.epochs);
+        self.wrong += run.wrong;
+        self.healthy_s += run.healthy_s;
+        if let Some((fault, delay_s)) = &run.fault {
+            let on = self.faults.entry(fault.clone()).or_default();
+            on.faults += 1;
+            on.delays_s.extend(*delay_s);
+        }
+    }
+
+    /// Faults, and how many of them were found.
+    #[must_use]
+    pub fn found(&self) -> (usize, usize) {
+        self.faults.values().fold((0, 0), |(found, all), on| {
+            (found + on.delays_s.len(), all + on.faults)
+        })
+    }
+
+    /// The horizontal error that `part` of the epochs stay below, m.
+    #[must_use]
+    pub fn error_m(&self, part: f64) -> f64 {
+        let mut errors: Vec<f64> = self.epochs.iter().map(|e| e.error_m).collect();
+        errors.sort_by(f64::total_cmp);
+        let index = (part * errors.len() as f64) as usize;
+        let last = errors.len().saturating_sub(1);
+        errors.get(index.min(last)).copied().unwrap_or(f64::NAN)
+    }
+
+    /// Part of the epochs whose error is beyond four deviations while nobody is left out.
+    #[must_use]
+    pub fn misleading(&self) -> f64 {
+        let misled = self.epochs.iter().filter(|e| e.misleads()).count();
+        misled as f64 / self.epochs.len() as f64
+    }
+
+    /// All figures.
+    #[must_use]
+    pub fn figures(&self) -> Value {
+        let (found, faults) = self.found();
+        json!({
+            "found": found, "faults": faults,
+            "horizontal_m": { "p50": self.error_m(0.5), "p95": self.error_m(0.95), "p99": self.error_m(0.99) },
+            "misleading": self.misleading(), "wrongly_excluded": self.wrong, "healthy_s": self.healthy_s,
+        })
+    }
+}
+
+/// Errors against what the receiver states of them (Stanford plot): what lies above the line misleads, unless a
+/// satellite is left out.
+///
+/// # Errors
+/// Where it cannot be drawn.
+pub fn stanford(consequences: &[Consequence]) -> Result<String> {
+    let chart = |all: &Consequence| {
+        let series = |label: &str, colour, pick: &dyn Fn(&Epoch) -> bool| Series {
+            label: label.to_owned(),
+            colour,
+            stroke: Stroke::Dots,
+            points: all
+                .epochs
+                .iter()
+                .filter(|e| pick(e))
+                .map(|e| (MISLEADING * e.sigma_m, e.error_m))
+                .filter(|(stated, error)| stated.max(*error) < DRAWN_M)
+                .collect(),
+        };
+        Chart {
+            caption: all.label.to_owned(),
+            x: "four stated deviations (m)",
+            y: "horizontal error (m)",
+            series: vec![
+                series("nobody left out", BLUE, &|e| !e.alarmed && !e.misleads()),
+                series("a satellite left out", GREEN, &|e| e.alarmed),
+                series("misleading", RED, &Epoch::misleads),
+            ],
+            marked: Vec::new(),
+            shaded: Vec::new(),
+        }
+    };
+    let charts: Vec<Chart> = consequences.iter().map(chart).collect();
+    picture("Faults and what the receiver says of its error", &charts)
+}
+
+/// A table of `consequences`.
+#[derive(Debug, Clone, Copy)]
+pub struct Table<'a>(pub &'a [Consequence]);
+
+impl fmt::Display for Table<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            f,
+            "| watched by | faults found | horizontal error from the onset on, median, 95 %, 99 % (m) | beyond four deviations unsaid | wrong exclusions before |\n\
+             |---|---|---|---|---|"
+        )?;
+        for row in self.0 {
+            let (found, faults) = row.found();
+            writeln!(
+                f,
+                "| {} | {found} of {faults} | {:.2}, {:.1}, {:.1} | {:.2} % | {} in {:.0} s |",
+                row.label,
+                row.error_m(0.5),
+                row.error_m(0.95),
+                row.error_m(0.99),
+                100.0 * row.misleading(),
+                row.wrong,
+                row.healthy_s
+            )?;
+        }
+        write!(f, "\n| fault |")?;
+        for row in self.0 {
+            write!(f, " {}: found, median delay (s) |", row.label)?;
+        }
+        writeln!(f, "\n|---|{}", "---|".repeat(self.0.len()))?;
+        let faults = self.0.first().map(|row| row.faults.keys());
+        for fault in faults.into_iter().flatten() {
+            write!(f, "| {fault} |")?;
+            for on in self.0.iter().filter_map(|row| row.faults.get(fault)) {
+                let (found, all) = (on.delays_s.len(), on.faults);
+                write!(f, " {found} of {all}, {:.2} |", on.median_delay_s())?;
+            }
+            writeln!(f)?;
+        }
+        Ok(())
+    }
+}
