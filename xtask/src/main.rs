@@ -15,7 +15,9 @@ use xtask::scenario::make::Level;
 use xtask::tidy::{Severity, tidy, workspace_root};
 use xtask::train::{Trained, command as training};
 use xtask::validate::threshold::Thresholds;
-use xtask::validate::{consistency, front_ends, generalisation, levels, monitors, sensitivity, starts};
+use xtask::validate::{
+    consistency, front_ends, generalisation, levels, monitors, sensitivity, starts,
+};
 
 #[derive(Debug, Parser)]
 #[command(

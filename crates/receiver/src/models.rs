@@ -52,6 +52,7 @@ mod tests {
             given_others: innovation,
             cn0_dbhz: 42.0 + 0.1 * normal(),
             cn0_now_hz: 10_f64.powf(4.2 + 0.08 * normal()),
+            tap_ratios: Some([0.75 + 0.02 * normal(), 0.75 + 0.02 * normal()]),
         }
     }
 

@@ -122,7 +122,11 @@ pub fn export(which: &Which) -> Result<String> {
     fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
     let path = folder.join("steps.csv");
     write(&data, &path)?;
-    Ok(format!("{} steps are in {}\n", data.steps(), path.display()))
+    Ok(format!(
+        "{} steps are in {}\n",
+        data.steps(),
+        path.display()
+    ))
 }
 
 /// Writes weights and card of `model` into `folder`, named after the kind.

@@ -84,5 +84,10 @@ pub fn labelled_steps(
 ) -> Result<Dataset> {
     let judged = judged::receive(scenario, level, &pupil.settings(scenario))?;
     let elapsed_s = |time_s| scenario.elapsed_s(time_s);
-    Ok(labelled(number, &judged.channels, &scenario.accounts, elapsed_s))
+    Ok(labelled(
+        number,
+        &judged.channels,
+        &scenario.accounts,
+        elapsed_s,
+    ))
 }

@@ -5,8 +5,8 @@ use anyhow::Result;
 use fault_ml::learned::lstm::LstmTraining;
 use fault_ml::learned::svm::SvmTraining;
 use fault_ml::learned::{
-    Calibration, Card, Dataset, FORMAT, FeatureSet, HealthyScores, LearnedModel, Mode, ModelKind, Network,
-    OperatingPoint, Split, VERSION, WindowEnd, Windows, choose, cn0_class_dbhz, features,
+    Calibration, Card, Dataset, FORMAT, FeatureSet, HealthyScores, LearnedModel, Mode, ModelKind,
+    Network, OperatingPoint, Split, VERSION, WindowEnd, Windows, choose, cn0_class_dbhz, features,
     healthy_scaler,
 };
 use fault_ml::metrics::BalancedAccuracy;

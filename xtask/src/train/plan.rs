@@ -196,7 +196,9 @@ impl Plan {
         let mut uniform = |low: f64, high: f64| random.random_range(low..high);
         let tow_s = uniform(0.0, 600_000.0).round();
         let place = |latitude_deg: f64, longitude_deg: f64| {
-            format!("{{ lat_deg = {latitude_deg:.4}, lon_deg = {longitude_deg:.4}, height_m = 100.0 }}")
+            format!(
+                "{{ lat_deg = {latitude_deg:.4}, lon_deg = {longitude_deg:.4}, height_m = 100.0 }}"
+            )
         };
         let (latitude_deg, longitude_deg) = (uniform(-65.0, 65.0), uniform(-179.0, 179.0));
         let at = place(latitude_deg, longitude_deg);
@@ -223,7 +225,10 @@ impl Plan {
                 let heading_rad = uniform(0.0, 360.0_f64).to_radians();
                 format!(
                     "{{ kind = 'great_circle', from = {at}, to = {}, speed_mps = {:.1} }}",
-                    place(latitude_deg + heading_rad.cos(), longitude_deg + heading_rad.sin()),
+                    place(
+                        latitude_deg + heading_rad.cos(),
+                        longitude_deg + heading_rad.sin()
+                    ),
                     uniform(5.0_f64.ln(), 1200.0_f64.ln()).exp()
                 )
             }

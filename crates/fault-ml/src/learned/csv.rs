@@ -8,13 +8,15 @@ use crate::Innovation;
 
 /// Columns.
 const HEADER: &str = "scenario,satellite,fault,time_s,code_m,code_sigma_m,rate_mps,rate_sigma_mps,\
-given_code_m,given_code_sigma_m,given_rate_mps,given_rate_sigma_mps,cn0_dbhz,cn0_now_hz,label";
+given_code_m,given_code_sigma_m,given_rate_mps,given_rate_sigma_mps,cn0_dbhz,cn0_now_hz,early_ratio,\
+late_ratio,label";
 /// Number of them.
-const COLUMNS: usize = 15;
+const COLUMNS: usize = 17;
 /// Steps farther apart than this belong to different sequences, s.
 const LONGEST_GAP_S: f64 = 0.15;
 
-/// Writes a header, and a row for each step of `data`. A range rate that was not measured is left empty.
+/// Writes a header, and a row for each step of `data`. A range rate or ratio of taps that was not measured is
+/// left empty.
 ///
 /// # Errors
 /// Where `out` cannot be written to.
@@ -41,7 +43,12 @@ pub fn write_csv(data: &Dataset, out: &mut impl Write) -> Result<(), LearnedErro
                 }
             }
             let label = u8::from(labelled.label.is_faulty());
-            writeln!(out, "{},{},{label}", step.cn0_dbhz, step.cn0_now_hz)?;
+            write!(out, "{},{},", step.cn0_dbhz, step.cn0_now_hz)?;
+            match step.tap_ratios {
+                Some([early, late]) => write!(out, "{early},{late},")?,
+                None => write!(out, ",,")?,
+            }
+            writeln!(out, "{label}")?;
         }
     }
     Ok(())
@@ -102,6 +109,8 @@ fn parse(number: usize, line: &str) -> Result<Row<'_>, LearnedError> {
         ref innovations @ ..,
         cn0,
         power,
+        early,
+        late,
         label,
     ] = fields.as_slice()
     else {
@@ -154,6 +163,11 @@ fn parse(number: usize, line: &str) -> Result<Row<'_>, LearnedError> {
         )?,
         cn0_dbhz: real("cn0_dbhz", cn0)?,
         cn0_now_hz: real("cn0_now_hz", power)?,
+        tap_ratios: if early.is_empty() && late.is_empty() {
+            None
+        } else {
+            Some([real("early_ratio", early)?, real("late_ratio", late)?])
+        },
     };
     let time_s = real("time_s", time)?;
     let labelled = LabelledStep {

@@ -7,7 +7,7 @@ use crate::error::within;
 use crate::{Innovation, MonitorError};
 
 /// Most features of a step.
-pub(super) const WIDEST: usize = 10;
+pub(super) const WIDEST: usize = 12;
 /// Innovations beyond so many deviations say no more than this many.
 const FARTHEST_SIGMAS: f64 = 20.0;
 /// Weight of the newest step in the running means of the code's deviation (memories of 10 and 50 steps), of the
@@ -15,8 +15,12 @@ const FARTHEST_SIGMAS: f64 = 20.0;
 const CODE_SHARES: [f64; 2] = [0.2, 0.04];
 const RATE_SHARE: f64 = 0.08;
 const SQUARE_SHARE: f64 = 0.1;
-/// Weight of the newest step in the C/N0 that a channel is used to: 500 steps, ten seconds.
+/// Weights of the newest step in the running means of the taps' ratio (memories of 10 and 50 steps).
+const SHAPE_SHARES: [f64; 2] = [0.2, 0.04];
+/// Weight of the newest step in the C/N0, and in the ratio of taps, that a channel is used to: 500 steps, ten seconds.
 const USUAL_SHARE: f64 = 0.002;
+/// Length of a step for the noise of the taps' ratio, s.
+const STEP_S: f64 = 0.02;
 /// C/N0 that counts as zero, dB-Hz, and what counts as one, dB.
 const CN0_MIDDLE_DBHZ: f64 = 40.0;
 const DECADE_DB: f64 = 10.0;
@@ -29,8 +33,10 @@ pub enum FeatureSet {
     Paper,
     /// Both given the other channels, over their predicted deviations; running means of them and of their squares
     /// over their own deviations (a small error that lasts stands out there); C/N0, the same against what the
-    /// channel is used to, and that of the last integration against the smoothed one, which answers at once. Of large numbers the inverse hyperbolic sine: they keep their order
-    /// without drowning the others.
+    /// channel is used to, and that of the last integration against the smoothed one, which answers at once; running
+    /// means of the ratio metric, early plus late over twice prompt, against what the channel is used to, over
+    /// their own deviations. Of large numbers the inverse hyperbolic sine: they keep their order without drowning
+    /// the others.
     Full,
 }
 
@@ -79,6 +85,41 @@ pub struct FeatureTrack {
     squares: [f64; 2],
     /// C/N0 that the channel is used to, about 40 dB-Hz, in tens of decibels.
     usual_cn0: Option<f64>,
+    shape: Shape,
+}
+
+/// The ratio metric: early plus late over twice prompt.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Shape {
+    /// What the channel is used to; the first steps' mean at first.
+    usual: f64,
+    steps: f64,
+    /// Running means of what it deviates, in deviations of a step.
+    means: [f64; 2],
+}
+
+impl Shape {
+    const NEW: Self = Self {
+        usual: 0.0,
+        steps: 0.0,
+        means: [0.0; 2],
+    };
+
+    fn follow(&mut self, ratios: [f64; 2], cn0_dbhz: f64) {
+        let ratio = (ratios[0] + ratios[1]) / 2.0;
+        self.steps += 1.0;
+        if self.steps > 1.0 {
+            // Of a triangle of height one at distance r: noise of early plus late given prompt.
+            let height = self.usual.clamp(0.05, 0.95);
+            let snr = STEP_S * 10_f64.powf(cn0_dbhz / 10.0);
+            let sigma = (height * (1.0 - height) / (2.0 * snr)).sqrt();
+            let deviation = normalised((ratio - self.usual, sigma));
+            for (mean, share) in self.means.iter_mut().zip(SHAPE_SHARES) {
+                *mean += share * (deviation - *mean);
+            }
+        }
+        self.usual += USUAL_SHARE.max(1.0 / self.steps) * (ratio - self.usual);
+    }
 }
 
 impl FeatureTrack {
@@ -91,6 +132,7 @@ impl FeatureTrack {
             rate: 0.0,
             squares: [0.0; 2],
             usual_cn0: None,
+            shape: Shape::NEW,
         }
     }
 
@@ -113,7 +155,11 @@ impl FeatureTrack {
             FeatureSet::Full => {
                 let (code, rate) = measured(&step.given_others)?;
                 let (cn0, power) = strength(step)?;
+                let ratios = shape(step)?;
                 let (code, rate) = (normalised(code), rate.map(normalised));
+                if let Some(ratios) = ratios {
+                    self.shape.follow(ratios, step.cn0_dbhz);
+                }
                 self.remember(code, rate, cn0);
                 let full = self.full(code, rate.unwrap_or_default(), cn0, power);
                 values = full.map(|value| value as f32);
@@ -129,6 +175,8 @@ impl FeatureTrack {
         let [short, long] = self.code;
         let [short_share, long_share] = CODE_SHARES;
         let [code_square, rate_square] = self.squares;
+        let [shape, lasting_shape] = self.shape.means;
+        let [shape_share, lasting_share] = SHAPE_SHARES;
         [
             code.asinh(),
             rate.asinh(),
@@ -140,6 +188,8 @@ impl FeatureTrack {
             cn0,
             cn0 - self.usual_cn0.unwrap_or(cn0),
             power,
+            (shape / spread(shape_share)).asinh(),
+            (lasting_shape / spread(lasting_share)).asinh(),
         ]
     }
 
@@ -197,6 +247,14 @@ fn checked(value: f64, sigma: f64, name: &'static str) -> Result<(f64, f64), Mon
 
 fn normalised((value, sigma): (f64, f64)) -> f64 {
     (value / sigma).clamp(-FARTHEST_SIGMAS, FARTHEST_SIGMAS)
+}
+
+/// Ratios of early and late to prompt.
+fn shape(step: &ChannelStep) -> Result<Option<[f64; 2]>, MonitorError> {
+    for ratio in step.tap_ratios.into_iter().flatten() {
+        within("ratio of taps", ratio, (-1e12, 1e12), "a number up to 1e12")?;
+    }
+    Ok(step.tap_ratios)
 }
 
 /// C/N0 about 40 dB-Hz, and that of the last integration against it, both in tens of decibels.
@@ -278,6 +336,39 @@ mod tests {
     }
 
     #[test]
+    fn a_peak_that_changes_shape_stands_out_of_its_noise() {
+        let mut random = ChaCha8Rng::seed_from_u64(8);
+        let mut track = FeatureTrack::new(FeatureSet::Full);
+        let mut step = ChannelStep::normal(1, 0.0, 0.0);
+        let snr = 0.02 * 10_f64.powf(4.5);
+        let sigma = (0.75 * 0.25 / (2.0 * snr)).sqrt();
+        let mut sums = [0.0; 2];
+        let steps = 20_000;
+        let mut noisy = |middle: f64| {
+            // Both taps alike: their mean has the whole of it.
+            Some([middle + sigma * random.sample::<f64, _>(StandardNormal); 2])
+        };
+        for _ in 0..steps {
+            step.tap_ratios = noisy(0.75);
+            let features = track.next(&step).unwrap();
+            for (sum, k) in sums.iter_mut().zip([10, 11]) {
+                *sum += f64::from(features.values()[k]).sinh().powi(2);
+            }
+        }
+        for sum in sums {
+            assert!((sum / f64::from(steps) - 1.0).abs() < 0.3, "{sums:?}");
+        }
+        let mut last = [0.0; 2];
+        for _ in 0..25 {
+            step.tap_ratios = noisy(0.75 + 2.0 * sigma);
+            let features = track.next(&step).unwrap();
+            last = [10, 11].map(|k| f64::from(features.values()[k]).sinh());
+        }
+        // Two deviations of a step, over deviations of a third and a seventh.
+        assert!(last[0] > 4.0 && last[1] > 6.0, "{last:?}");
+    }
+
+    #[test]
     fn without_a_range_rate_it_is_the_one_expected() {
         let mut step = ChannelStep::normal(7, 1.0, 5.0);
         step.innovation.rate_sigma_mps = f64::INFINITY;
@@ -292,7 +383,7 @@ mod tests {
     fn what_is_no_number_is_named() {
         /// What makes a step unusable, and how the error begins.
         type Spoiled<'a> = (fn(&mut ChannelStep), &'a str);
-        let spoil: [Spoiled; 5] = [
+        let spoil: [Spoiled; 6] = [
             (
                 |s| s.given_others.code_m = f64::NAN,
                 "innovation (m) is NaN",
@@ -307,6 +398,10 @@ mod tests {
             ),
             (|s| s.cn0_dbhz = f64::NAN, "C/N0 (dB-Hz) is NaN"),
             (|s| s.cn0_now_hz = f64::NAN, "C/N0 now (Hz) is NaN"),
+            (
+                |s| s.tap_ratios = Some([0.75, f64::NAN]),
+                "ratio of taps is NaN",
+            ),
         ];
         for (spoil, text) in spoil {
             let mut step = ChannelStep::normal(1, 0.0, 0.0);

@@ -97,8 +97,8 @@ fn files_that_are_no_models_are_refused_by_what_is_wrong() {
     );
     refused(
         &weights,
-        &with("version", json!(3)),
-        "model card: version is 3: expected 2",
+        &with("version", json!(4)),
+        "model card: version is 4: expected 3",
     );
     refused(
         &weights,

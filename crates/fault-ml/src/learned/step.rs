@@ -15,6 +15,8 @@ pub struct ChannelStep {
     pub cn0_dbhz: f64,
     /// C/N0 by the last integration alone, Hz; noise may take it below zero.
     pub cn0_now_hz: f64,
+    /// Early and late correlator sums over prompt, in phase with it, since the last step, where there are any.
+    pub tap_ratios: Option<[f64; 2]>,
 }
 
 #[cfg(test)]
@@ -33,6 +35,7 @@ impl ChannelStep {
             given_others: innovation,
             cn0_dbhz: 45.0,
             cn0_now_hz: 3e4,
+            tap_ratios: Some([0.75; 2]),
         }
     }
 }

@@ -3,6 +3,7 @@
 use num_complex::Complex64;
 
 use super::Lock;
+use super::discriminator::EarlyPromptLate;
 use crate::SignalId;
 
 /// What a channel says at a navigation epoch.
@@ -36,6 +37,9 @@ pub struct ChannelEpoch {
     /// C/N0 by the last integration alone, or while it pulls in by the latest ones, Hz; noise may take it below
     /// zero.
     pub cn0_now_hz: f64,
+    /// Early and late sums over prompt, in phase with it, of the integrations since the previous epoch; `None`
+    /// without one and while the channel pulls in.
+    pub tap_ratios: Option<[f64; 2]>,
     /// What the channel sees.
     pub lock: Lock,
     /// Prompt sum of the last integration over the noise deviation.
@@ -85,6 +89,28 @@ pub(super) struct Integration {
     pub(super) phase_cycles: f64,
     pub(super) code_error_chips: f64,
     pub(super) frequency_error_hz: f64,
+}
+
+/// Products of the sums since the previous epoch with prompt.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct TapProducts {
+    early: f64,
+    prompt: f64,
+    late: f64,
+}
+
+impl TapProducts {
+    pub(super) fn push(&mut self, taps: &EarlyPromptLate) {
+        let in_phase = |tap: Complex64| tap.re * taps.prompt.re + tap.im * taps.prompt.im;
+        self.early += in_phase(taps.early);
+        self.prompt += in_phase(taps.prompt);
+        self.late += in_phase(taps.late);
+    }
+
+    /// Early and late over prompt.
+    pub(super) fn ratios(&self) -> Option<[f64; 2]> {
+        (self.prompt > 0.0).then(|| [self.early / self.prompt, self.late / self.prompt])
+    }
 }
 
 /// The integrations since the previous epoch.
@@ -146,6 +172,23 @@ impl PreFilter {
 mod tests {
     use super::*;
     use approx::assert_abs_diff_eq;
+
+    #[test]
+    fn ratios_are_those_in_phase_with_prompt() {
+        let mut products = TapProducts::default();
+        assert_eq!(products.ratios(), None);
+        // A strong integration, and a weak one of the other sign whose late sum is a quarter cycle ahead.
+        for (early, prompt, late) in [(6.0, 8.0, 4.0), (-1.0, -2.0, 0.0)] {
+            products.push(&EarlyPromptLate {
+                early: Complex64::new(early, 0.0),
+                prompt: Complex64::new(prompt, 0.0),
+                late: Complex64::new(late, if late == 0.0 { 2.0 } else { 0.0 }),
+            });
+        }
+        let [early, late] = products.ratios().unwrap();
+        assert_abs_diff_eq!(early, 50.0 / 68.0, epsilon = 1e-15);
+        assert_abs_diff_eq!(late, 32.0 / 68.0, epsilon = 1e-15);
+    }
 
     #[test]
     fn the_line_has_the_slope_of_the_phase() {

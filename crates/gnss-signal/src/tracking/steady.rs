@@ -7,7 +7,7 @@ use num_complex::Complex64;
 
 use super::cn0;
 use super::discriminator::{EarlyPromptLate, FrequencyDiscriminator, PhaseDiscriminator};
-use super::epoch::{ChannelEpoch, EpochValues, Integration, PhaseLine, PreFilter};
+use super::epoch::{ChannelEpoch, EpochValues, Integration, PhaseLine, PreFilter, TapProducts};
 use super::lock::LockDetector;
 use super::loop_filter::{CarrierBandwidth, CarrierLoop, CodeLoop};
 use super::nco::Nco;
@@ -55,6 +55,7 @@ pub(super) struct Steady {
     lock: Lock,
     cn0_hz: f64,
     cn0_now_hz: f64,
+    tap_products: TapProducts,
     previous_prompt: Option<Complex64>,
     bit: Bit,
     pre_filter: PreFilter,
@@ -107,6 +108,7 @@ impl Steady {
             lock: Lock::Code,
             cn0_hz,
             cn0_now_hz: cn0_hz,
+            tap_products: TapProducts::default(),
             previous_prompt: None,
             bit: Bit::default(),
             pre_filter: PreFilter::default(),
@@ -235,6 +237,7 @@ impl Steady {
         let interval_s = (end_tick - start.tick) as f64 / start.front_end.sample_rate_hz;
         self.watch_power(taps.prompt, noise_variance, interval_s, start.tick);
         self.prompt = taps.prompt / noise_variance.sqrt();
+        self.tap_products.push(taps);
         let periods = self.nco.nearest_period() - start.nearest_period();
         let phase_error = PhaseDiscriminator::Costas.error_cycles(taps.prompt);
         let middle_s = (start.tick + end_tick) as f64 / 2.0 / start.front_end.sample_rate_hz;
@@ -446,6 +449,7 @@ impl Steady {
             phase_slipped: std::mem::replace(&mut self.slipped, self.lock != Lock::Carrier),
             cn0_dbhz: cn0::dbhz(self.cn0_hz),
             cn0_now_hz: self.cn0_now_hz,
+            tap_ratios: std::mem::take(&mut self.tap_products).ratios(),
             lock: self.lock,
             prompt: self.prompt,
             code_error_chips: measured.code_error_chips,

@@ -146,7 +146,10 @@ fn flights(lessons: &Lessons, level: Level) -> Result<Vec<Flight>> {
     let scenario = Scenario::new(&catalogue::find("zhu2020")?, None)?;
     let monitors = [
         ("without detection", None),
-        ("LSTM of 50", Some(paper::monitor(ModelKind::Lstm, lessons)?)),
+        (
+            "LSTM of 50",
+            Some(paper::monitor(ModelKind::Lstm, lessons)?),
+        ),
         ("SVM of 30", Some(paper::monitor(ModelKind::Svm, lessons)?)),
     ];
     let (labels, models): (Vec<_>, Vec<_>) = monitors.into_iter().unzip();

@@ -156,9 +156,11 @@ fn fly(plan: &Plan, scenario: &Scenario, watch: &Watch) -> Result<Flown> {
         .count();
     let fault = own.map(|account| {
         let victims: &[SatelliteId] = &account.satellites;
-        let found = judged.events.iter().filter(excluded).find(|e| {
-            e.time_s >= onset_s && e.satellite.is_some_and(|s| victims.contains(&s))
-        });
+        let found = judged
+            .events
+            .iter()
+            .filter(excluded)
+            .find(|e| e.time_s >= onset_s && e.satellite.is_some_and(|s| victims.contains(&s)));
         let name = account.kind.to_owned() + plan.severity.suffix();
         (name, found.map(|e| e.time_s - onset_s))
     });

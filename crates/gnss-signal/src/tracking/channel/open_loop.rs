@@ -322,6 +322,7 @@ impl PullIn {
             phase_slipped: true,
             cn0_dbhz: cn0::dbhz(cn0_hz),
             cn0_now_hz: recent.cn0_hz,
+            tap_ratios: None,
             lock: Lock::PullIn,
             prompt: sums.last()?.prompt / sums.noise_variance().sqrt(),
             code_error_chips: recent.code_offset_chips,

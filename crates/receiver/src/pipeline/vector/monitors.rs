@@ -111,6 +111,7 @@ pub(super) fn step(
         given_others: pair(deviation(&given.code), given_rate),
         cn0_dbhz: epoch.cn0_dbhz,
         cn0_now_hz: epoch.cn0_now_hz,
+        tap_ratios: epoch.tap_ratios,
     }
 }
 
