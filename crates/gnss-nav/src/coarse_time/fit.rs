@@ -47,7 +47,7 @@ impl Seen<'_> {
         )
     }
 
-    fn row(&self) -> Row<UNKNOWNS> {
+    pub(super) fn row(&self) -> Row<UNKNOWNS> {
         let los = &self.predicted.line_of_sight;
         let e = los.unit_ecef;
         let rate =
@@ -161,7 +161,11 @@ pub(super) fn without_masked<'a>(
     Ok(above)
 }
 
-fn see<'a>(
+/// `ranged` as it should be from `position` at `time`, the clock's bias being `bias_m`.
+///
+/// # Errors
+/// As [`received_state`].
+pub(super) fn see<'a>(
     ranged: &Ranged<'a>,
     model: &MeasurementModel,
     position: &Vector3<f64>,
@@ -189,7 +193,7 @@ fn see<'a>(
 }
 
 /// The prior as four weak equations: they hold what the geometry leaves open.
-fn ties(anchor: &Anchor, position: &Vector3<f64>, time: GpsTime) -> Vec<Row<UNKNOWNS>> {
+pub(super) fn ties(anchor: &Anchor, position: &Vector3<f64>, time: GpsTime) -> Vec<Row<UNKNOWNS>> {
     let away = anchor.position_ecef_m - position;
     let tie = |index: usize, residual: f64, sigma: f64| Row {
         gradient: SVector::from_fn(|i, _| if i == index { 1.0 } else { 0.0 }),

@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 
 use super::fit::{Fit, Ranged, UNKNOWNS, fit};
+use super::screen::Screen;
 use super::{Anchor, Channel};
 use crate::chi_square::chi_square_threshold;
 use crate::constants::{CA_PERIOD_M, SPEED_OF_LIGHT_MPS};
@@ -80,8 +81,11 @@ fn best_without<'a>(
     anchor: &Anchor,
     model: &MeasurementModel,
 ) -> Option<Fit<'a>> {
+    let all = ranged(channels, hypothesis, &[]);
+    let screen = Screen::new(&all, anchor, model, hypothesis.start, BELIEVED);
     combinations(channels.len(), exclusions)
         .iter()
+        .filter(|out| screen.lets_pass(out))
         .filter_map(|out| {
             let ranged = ranged(channels, hypothesis, out);
             fit(&ranged, anchor, model, hypothesis.start).ok()

@@ -9,6 +9,7 @@
 mod anchor;
 mod fit;
 mod hypothesis;
+mod screen;
 
 use nalgebra::{Matrix4, Vector3, Vector4};
 
