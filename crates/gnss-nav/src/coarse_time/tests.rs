@@ -266,3 +266,32 @@ fn the_elevation_mask_holds_whatever_it_leaves() {
         "{four:?}"
     );
 }
+
+#[test]
+fn the_right_milliseconds_pass_the_screen_and_one_wrong_does_not() {
+    for seed in 0..10 {
+        let world = world(seed);
+        let prior = prior(&world, seed, 150e3, -55.0);
+        let (channels, _) = usable(&world.measurements, &world.store, &prior);
+        let anchor = anchor::from_prior(&prior, &channels).unwrap();
+        let mut ranged: Vec<fit::Ranged> = channels
+            .iter()
+            .map(|&channel| {
+                let expected = predict(channel.ephemeris, &world.receiver).unwrap();
+                let pseudorange_m = SPEED_OF_LIGHT_MPS * (truth_time() - expected.transmit_time);
+                let milliseconds = (pseudorange_m + channel.fraction_m) / CA_PERIOD_M;
+                fit::Ranged {
+                    channel,
+                    milliseconds: milliseconds.round() as i64,
+                }
+            })
+            .collect();
+        let start = (anchor.position_ecef_m, anchor.time);
+        let screen = |ranged: &[_]| screen::Screen::new(ranged, &anchor, &model(), start, 2.0);
+        assert!(screen(&ranged).lets_pass(&[]), "seed {seed}");
+        ranged[2].milliseconds += 1;
+        let wrong = screen(&ranged);
+        assert!(!wrong.lets_pass(&[]), "seed {seed}");
+        assert!(wrong.lets_pass(&[2]), "seed {seed}");
+    }
+}
