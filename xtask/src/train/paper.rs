@@ -6,8 +6,8 @@ use fault_ml::learned::lstm::LstmTraining;
 use fault_ml::learned::svm::SvmTraining;
 use fault_ml::learned::{
     Calibration, Card, Dataset, FORMAT, FeatureSet, HealthyScores, LearnedModel, Mode, ModelKind,
-    Network, OperatingPoint, Split, VERSION, WindowEnd, Windows, choose, cn0_class_dbhz, features,
-    healthy_scaler,
+    Network, OperatingPoint, Sequence, Split, VERSION, WindowEnd, Windows, choose, cn0_class_dbhz,
+    features, healthy_scaler,
 };
 use fault_ml::metrics::BalancedAccuracy;
 use gnss_nav::tracking_noise;
@@ -178,6 +178,9 @@ pub const JUDGED_BY: u64 = 1_000_001;
 const QUIET_FROM: u64 = 3_000_001;
 /// Part of what is learned from that is held out, to stop by and for thresholds.
 const HELD_OUT: f64 = 0.25;
+/// A monitor that flies has learned from classes from this one on, dB-Hz: flights are at 43, and raw innovations do
+/// not say of which class they are, so that weaker ones would set its threshold.
+const FLOWN_FROM_DBHZ: f64 = 40.0;
 /// False alarms of a channel an hour in a flight.
 const FLIGHT_ALARMS_PER_HOUR: f64 = 0.1;
 
@@ -213,8 +216,13 @@ pub fn monitor(kind: ModelKind, lessons: &Lessons) -> Result<LearnedModel> {
         ModelKind::Svm => SVM_LENGTH,
         ModelKind::Lstm => LSTM_LENGTH,
     };
-    let (held_out, quiet) = (&lessons.split.validation, &lessons.quiet);
-    let model = calibrated(fit(kind, length, &lessons.split, 1)?, held_out)?;
+    let split = Split {
+        training: flown(&lessons.split.training),
+        validation: flown(&lessons.split.validation),
+        test: Dataset::default(),
+    };
+    let (held_out, quiet) = (&split.validation, &flown(&lessons.quiet));
+    let model = calibrated(fit(kind, length, &split, 1)?, held_out)?;
     with_evidence(model, held_out, FLIGHT_ALARMS_PER_HOUR, |examinees| {
         let scores = |examinee: &Examinee| {
             let mut healthy = HealthyScores::default();
@@ -224,6 +232,14 @@ pub fn monitor(kind: ModelKind, lessons: &Lessons) -> Result<LearnedModel> {
         };
         examinees.iter().map(scores).collect()
     })
+}
+
+/// What of `data` is as strong as a flight.
+fn flown(data: &Dataset) -> Dataset {
+    let strong = |s: &&Sequence| s.steps.iter().all(|s| s.step.cn0_dbhz >= FLOWN_FROM_DBHZ);
+    Dataset {
+        sequences: data.sequences.iter().filter(strong).cloned().collect(),
+    }
 }
 
 /// Trains a model of `kind` on windows of `length` raw innovations.
