@@ -161,7 +161,7 @@ impl Monitored {
         assured.solution.excluded.extend(out);
         if let Monitor::Particle(monitor) = &self.monitor {
             assured.protection = Some(&assured.solution)
-                .filter(|s| s.consistency == Consistency::Passed)
+                .filter(|s| s.consistency == Consistency::Passed && gross.is_unique)
                 .and_then(|_| levels(monitor));
         }
         Ok(assured)
