@@ -100,7 +100,8 @@ impl LnavDecoder {
             self.bits.forget_before(unread.min(found.start));
             self.is_doubtful = bearing == Bearing::Either;
         }
-        if self.is_doubtful && !found.counts_on {
+        let is_open = self.is_doubtful || frame_sync::has_rival(&self.bits, &found);
+        if is_open && !found.counts_on {
             return;
         }
         self.is_doubtful = false;

@@ -15,10 +15,10 @@
 //! neighbours prove nothing then: such a candidate is told from a real one by whether it counts on
 //! (`LnavDecoder`).
 
-use super::SUBFRAME_BITS;
 use super::bit_buffer::BitBuffer;
 use super::parity::{Tail, check_word};
 use super::subframe::hand_over::{HandOver, PREAMBLE, PREAMBLE_BITS};
+use super::{SUBFRAME_BITS, WORD_BITS};
 
 /// Sign of the carrier phase a channel settled on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -92,6 +92,14 @@ pub(super) fn candidate(bits: &BitBuffer, start: i64) -> Option<Candidate> {
             HandOver::at(count + 1).subframe_count == hand_over.subframe_count
         }),
     })
+}
+
+/// Whether there is another candidate among the words before `found`: either may be data.
+pub(super) fn has_rival(bits: &BitBuffer, found: &Candidate) -> bool {
+    let words = 1..(SUBFRAME_BITS / WORD_BITS) as i64;
+    words
+        .map(|words| found.start - words * WORD_BITS as i64)
+        .any(|start| hand_over(bits, start).is_some())
 }
 
 fn hand_over_count(bits: &BitBuffer, start: i64) -> Option<u32> {
