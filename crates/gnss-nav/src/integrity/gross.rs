@@ -28,8 +28,8 @@ pub struct Gross {
     pub sound: Vec<Measurement>,
     /// What is wrong, in order; mostly nothing.
     pub wrong: Vec<Measurement>,
-    /// Position of the sound ones from geometry alone, ECEF, m; the start where they give none.
-    pub place_ecef_m: Vector3<f64>,
+    /// Position of the sound ones from geometry alone, ECEF, m, where they give one.
+    pub place_ecef_m: Option<Vector3<f64>>,
     /// Whether it could be no others.
     pub is_unique: bool,
     /// Chi-square of all, infinite where they give no position.
@@ -90,8 +90,8 @@ pub fn search(
 struct Tested {
     /// Infinite where they give no position.
     chi_square: f64,
-    /// Their position, or the start.
-    place_ecef_m: Vector3<f64>,
+    /// Their position.
+    place_ecef_m: Option<Vector3<f64>>,
 }
 
 impl Tested {
@@ -105,11 +105,11 @@ impl Tested {
         match least_squares::by_geometry(&kept, start_ecef_m) {
             Ok((place_ecef_m, residuals_m)) => Self {
                 chi_square: residuals_m.iter().map(|r| (r / DEVIATION_M).powi(2)).sum(),
-                place_ecef_m,
+                place_ecef_m: Some(place_ecef_m),
             },
             Err(_) => Self {
                 chi_square: f64::INFINITY,
-                place_ecef_m: *start_ecef_m,
+                place_ecef_m: None,
             },
         }
     }

@@ -107,7 +107,11 @@ pub fn solve(
         most_faults: settings.most_faults.saturating_sub(gross.wrong.len()),
         ..*settings
     };
-    let mut assured = solve_sound(&gross.sound, model, &gross.place_ecef_m, &fewer)?;
+    let all = match &gross.place_ecef_m {
+        Some(place_ecef_m) => least_squares::solve_near(&gross.sound, model, place_ecef_m),
+        None => least_squares::solve(&gross.sound, model, start_ecef_m),
+    };
+    let mut assured = assure(&gross.sound, model, all?, &fewer)?;
     if gross.wrong.is_empty() {
         return Ok(assured);
     }
@@ -124,14 +128,13 @@ pub fn solve(
     Ok(assured)
 }
 
-/// The same of measurements none of which is grossly wrong.
-fn solve_sound(
+/// The same of measurements none of which is grossly wrong, and the solution of them all.
+fn assure(
     measurements: &[Measurement],
     model: &MeasurementModel,
-    start_ecef_m: &Vector3<f64>,
+    all: Solution,
     settings: &IntegritySettings,
 ) -> Result<Assured, NavError> {
-    let all = least_squares::solve(measurements, model, start_ecef_m)?;
     let Cleared {
         mut solution,
         misfits,

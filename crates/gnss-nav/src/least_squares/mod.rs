@@ -130,13 +130,24 @@ pub fn solve(
     start_ecef_m: &Vector3<f64>,
 ) -> Result<Solution, NavError> {
     let coarse = position::coarse(&measurements.iter().collect::<Vec<_>>(), start_ecef_m)?;
-    let coarse = coarse.position_ecef_m;
+    solve_near(measurements, model, &coarse.position_ecef_m)
+}
+
+/// As [`solve`], with the elevation mask laid at `place_ecef_m`, where [`by_geometry`] has found the receiver.
+///
+/// # Errors
+/// As [`solve`].
+pub(crate) fn solve_near(
+    measurements: &[Measurement],
+    model: &MeasurementModel,
+    place_ecef_m: &Vector3<f64>,
+) -> Result<Solution, NavError> {
     let (used, masked): (Vec<&Measurement>, Vec<&Measurement>) =
         measurements.iter().partition(|m| {
-            let predicted = model.predict(&m.state, &coarse, m.receive_time);
+            let predicted = model.predict(&m.state, place_ecef_m, m.receive_time);
             predicted.look.elevation_rad >= model.elevation_mask_rad
         });
-    let fix = position::iterate(&used, model, &coarse)?;
+    let fix = position::iterate(&used, model, place_ecef_m)?;
     let rates: Vec<RateEquation> = used
         .iter()
         .zip(&fix.predicted)

@@ -129,7 +129,8 @@ impl Monitored {
             start_ecef_m,
             IntegritySettings::default().most_faults,
         );
-        let all = least_squares::solve(&gross.sound, model, &gross.place_ecef_m)?;
+        let start_ecef_m = &gross.place_ecef_m.unwrap_or(*start_ecef_m);
+        let all = least_squares::solve(&gross.sound, model, start_ecef_m)?;
         self.move_on(time_s, &all);
         if self
             .last_s
@@ -150,7 +151,7 @@ impl Monitored {
             .sound
             .iter()
             .partition(|m| self.sets_aside(m.satellite));
-        let mut assured = integrity::solve(&rest, model, &gross.place_ecef_m, &self.settings)?;
+        let mut assured = integrity::solve(&rest, model, start_ecef_m, &self.settings)?;
         let misfits = aside
             .iter()
             .map(|m| self.misfit(m, model, &assured.solution));
