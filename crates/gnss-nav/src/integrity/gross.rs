@@ -38,6 +38,7 @@ pub struct Gross {
 
 impl Gross {
     /// What is said of `wrong`, held against a solution without them; a satellite that is set there has no residual.
+    #[must_use]
     pub fn misfits(&self, model: &MeasurementModel, solution: &Solution) -> Vec<Misfit> {
         let misfit = |m: &Measurement| Misfit {
             satellite: m.satellite,
@@ -52,6 +53,7 @@ impl Gross {
 
 /// Seeks one, then two satellites without which geometry alone agrees, `most_faults` at most: errors of tens of
 /// kilometres and more.
+#[must_use]
 pub fn search(
     measurements: &[Measurement],
     start_ecef_m: &Vector3<f64>,
