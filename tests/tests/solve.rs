@@ -198,6 +198,27 @@ fn an_injected_step_is_excluded_where_it_began() {
 }
 
 #[test]
+fn an_error_of_thousands_of_kilometres_costs_no_epoch() {
+    for (raim, inject) in [("ls", "G09:6e6@300"), ("pf", "G03:-6e6@300")] {
+        let more = ["--raim", raim, "--inject", inject];
+        let Some(solved) = solve_site(&SITES[0], &more) else {
+            return;
+        };
+        let excluded = solved.events("excluded");
+        assert_eq!(excluded.len(), 1, "{excluded:?}");
+        assert_eq!(excluded[0]["sat"], inject[..3]);
+        assert_eq!(excluded[0]["time_s"], 300.0);
+        // A pseudorange that is 20 ms too long finds its satellite 20 ms earlier: up to 16 m of range.
+        let off_m = excluded[0]["residual_m"].as_f64().unwrap().abs() - 6e6;
+        assert!(off_m.abs() < 20.0, "{off_m} m");
+        let summary = solved.summary();
+        assert_eq!(summary["fixes"], 900);
+        let worst_m = summary["error"]["position_3d_max_m"].as_f64().unwrap();
+        assert!(worst_m < 5.0, "{worst_m} m");
+    }
+}
+
+#[test]
 fn protection_levels_hold_and_false_alarms_are_rare() {
     for site in &SITES {
         let Some(solved) = solve_site(site, &[]) else {

@@ -9,7 +9,7 @@ use clap::{Parser, Subcommand};
 use xtask::ci::ci;
 use xtask::code_noise::{self, Experiment, Parts};
 use xtask::demo::demo;
-use xtask::reproduce::{Making, Paper, reproduce};
+use xtask::reproduce::{Making, Outcome, Paper, reproduce};
 use xtask::scenario::command::{self as scenario, Command, Which};
 use xtask::scenario::make::Level;
 use xtask::tidy::{Severity, tidy, workspace_root};
@@ -79,7 +79,7 @@ enum Task {
         /// Seeds of each scenario of jiang2017 and li2019 [default: 8 and 12]
         #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
         seeds: Option<u16>,
-        /// Folder that receives a folder of the paper's name.
+        /// Folder that receives a folder of the paper's name, and of all papers an index.
         #[arg(long, value_name = "DIR", default_value = "reproduced")]
         out: PathBuf,
     },
@@ -296,9 +296,9 @@ fn perform(task: Task) -> Result<ExitCode> {
             out: folder,
         } => {
             let seeds = seeds.map(usize::from);
-            let outcome = reproduce(paper, Making { level, seeds }, &folder)?;
-            writeln!(out, "{outcome}")?;
-            Ok(verdict(outcome.holds()))
+            let told = |outcome: &Outcome| Ok(writeln!(out, "{outcome}")?);
+            let outcomes = reproduce(paper, Making { level, seeds }, &folder, told)?;
+            Ok(verdict(outcomes.iter().all(Outcome::holds)))
         }
         Task::Train {
             monitor,

@@ -1,6 +1,7 @@
 //! Experiments of the papers, repeated: figures, tables, and what of them holds.
 
 pub mod chart;
+mod index;
 pub mod jiang2017;
 pub mod li2019;
 mod outcome;
@@ -11,7 +12,7 @@ pub mod zhu2020;
 
 use std::path::Path;
 
-use anyhow::{Result, bail};
+use anyhow::{Context, Result};
 use clap::ValueEnum;
 
 pub use outcome::{Check, Outcome};
@@ -44,21 +45,49 @@ pub struct Making {
     pub seeds: Option<usize>,
 }
 
-/// Repeats `paper` and writes its folder below `out`; tells whether every check holds.
+impl Paper {
+    const EACH: [Self; 5] = [
+        Self::Jiang2017,
+        Self::Li2019,
+        Self::Wang2016,
+        Self::Zhang2014,
+        Self::Zhu2020,
+    ];
+}
+
+/// Repeats `paper`, or all of them one after the other, and writes a folder each below `out`; `told` is given each
+/// outcome as it comes. All of them leave an index, `out/report.md`.
 ///
 /// # Errors
-/// Where the paper cannot be repeated yet or a file cannot be written.
-pub fn reproduce(paper: Paper, making: Making, out: &Path) -> Result<Outcome> {
-    let outcome = match paper {
-        Paper::Jiang2017 => jiang2017::reproduce(making)?,
-        Paper::Li2019 => li2019::reproduce(making)?,
-        Paper::Wang2016 => wang2016::reproduce()?,
-        Paper::Zhu2020 => zhu2020::reproduce(making)?,
-        Paper::Zhang2014 => zhang2014::reproduce()?,
-        Paper::All => {
-            bail!("reproduce all: not there yet; each paper by itself is");
-        }
+/// Where a paper cannot be repeated or a file cannot be written.
+pub fn reproduce(
+    paper: Paper,
+    making: Making,
+    out: &Path,
+    mut told: impl FnMut(&Outcome) -> Result<()>,
+) -> Result<Vec<Outcome>> {
+    let papers = match &paper {
+        Paper::All => &Paper::EACH[..],
+        one => std::slice::from_ref(one),
     };
-    outcome.write(out)?;
-    Ok(outcome)
+    let mut outcomes = Vec::new();
+    for paper in papers {
+        let outcome = match paper {
+            Paper::Jiang2017 => jiang2017::reproduce(making)?,
+            Paper::Li2019 => li2019::reproduce(making)?,
+            Paper::Wang2016 => wang2016::reproduce()?,
+            Paper::Zhu2020 => zhu2020::reproduce(making)?,
+            Paper::Zhang2014 => zhang2014::reproduce()?,
+            Paper::All => continue,
+        };
+        outcome.write(out)?;
+        told(&outcome)?;
+        outcomes.push(outcome);
+    }
+    if paper == Paper::All {
+        let path = out.join("report.md");
+        let text = index::page(&outcomes);
+        std::fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))?;
+    }
+    Ok(outcomes)
 }

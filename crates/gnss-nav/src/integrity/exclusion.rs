@@ -78,7 +78,7 @@ pub(super) fn without_faults(
 }
 
 /// Redundant satellites that must be left after taking out so many.
-const fn redundancy_needed(faults: usize) -> usize {
+pub(super) const fn redundancy_needed(faults: usize) -> usize {
     if faults == 1 { 1 } else { 2 }
 }
 
@@ -123,7 +123,7 @@ fn most_suspect(
 }
 
 /// Calls `visit` with every set of `size` of the numbers below `count`, in lexical order.
-fn for_each_set(count: usize, size: usize, visit: &mut impl FnMut(&[usize])) {
+pub(super) fn for_each_set(count: usize, size: usize, visit: &mut impl FnMut(&[usize])) {
     let mut set: Vec<usize> = (0..size).collect();
     if size == 0 || size > count {
         return;

@@ -6,6 +6,7 @@
 //! `Walter1995`.
 
 mod exclusion;
+pub mod gross;
 mod parity;
 mod protection;
 #[cfg(test)]
@@ -86,7 +87,8 @@ pub struct Assured {
 
 /// Solves one epoch, takes out what contradicts the rest, and says how far that can be relied on.
 ///
-/// The chi-square of the residuals is tested. Where it fails, the sets of one satellite, then of two
+/// First geometry alone is tested, before the elevation mask: an error of thousands of kilometres would lay the mask at a
+/// place where other satellites are up. Then the chi-square of the residuals. Where it fails, the sets of one satellite, then of two
 /// and so on are sought in parity space without which it passes: the smallest, and of those the one
 /// that explains most. One exclusion needs one redundant satellite left, several need two: three
 /// of eight that agree by chance are common. Satellites below the mask are held against the
@@ -100,7 +102,39 @@ pub fn solve(
     start_ecef_m: &Vector3<f64>,
     settings: &IntegritySettings,
 ) -> Result<Assured, NavError> {
-    let all = least_squares::solve(measurements, model, start_ecef_m)?;
+    let gross = gross::search(measurements, start_ecef_m, settings.most_faults);
+    let fewer = IntegritySettings {
+        most_faults: settings.most_faults.saturating_sub(gross.wrong.len()),
+        ..*settings
+    };
+    let all = match &gross.place_ecef_m {
+        Some(place_ecef_m) => least_squares::solve_near(&gross.sound, model, place_ecef_m),
+        None => least_squares::solve(&gross.sound, model, start_ecef_m),
+    };
+    let mut assured = assure(&gross.sound, model, all?, &fewer)?;
+    if gross.wrong.is_empty() {
+        return Ok(assured);
+    }
+    assured.protection = assured.protection.filter(|_| gross.is_unique);
+    let misfits = gross.misfits(model, &assured.solution);
+    assured.misfits.extend(misfits);
+    let place = |satellite| measurements.iter().position(|m| m.satellite == satellite);
+    assured
+        .misfits
+        .sort_by_key(|m| (m.place == Place::Unused, place(m.satellite)));
+    let wrong = gross.wrong.iter().map(|m| m.satellite);
+    assured.solution.excluded.extend(wrong);
+    assured.solution.excluded.sort_by_key(|s| place(*s));
+    Ok(assured)
+}
+
+/// The same of measurements none of which is grossly wrong, and the solution of them all.
+fn assure(
+    measurements: &[Measurement],
+    model: &MeasurementModel,
+    all: Solution,
+    settings: &IntegritySettings,
+) -> Result<Assured, NavError> {
     let Cleared {
         mut solution,
         misfits,

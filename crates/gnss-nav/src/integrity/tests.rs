@@ -107,6 +107,43 @@ fn a_fault_of_code_periods_is_taken_out_where_six_satellites_are_left_to_tell() 
 }
 
 #[test]
+fn errors_that_lay_the_mask_elsewhere_are_taken_out() {
+    let masked = MeasurementModel {
+        elevation_mask_rad: 10f64.to_radians(),
+        ..model()
+    };
+    let settings = IntegritySettings::default();
+    let found = |measurements: &[Measurement]| {
+        let assured = solve(measurements, &masked, &Vector3::zeros(), &settings).unwrap();
+        assert_eq!(assured.solution.consistency, Consistency::Passed);
+        assert!(error_m(&assured) < 30.0);
+        let misfits = assured.misfits.iter();
+        assert!(misfits.clone().all(|m| m.place == Place::InUse));
+        let names: Vec<SatelliteId> = misfits.map(|m| m.satellite).collect();
+        assert_eq!(names, assured.solution.excluded);
+        names
+    };
+    for fault_m in [6e6, -6e6, 1.5e7, f64::NAN] {
+        for bad in 0..7 {
+            let mut measurements = epoch(7, 2);
+            measurements[bad].pseudorange_m += fault_m;
+            assert_eq!(
+                found(&measurements),
+                [measurements[bad].satellite],
+                "{fault_m} m"
+            );
+        }
+    }
+    let mut two = epoch(9, 2);
+    two[6].pseudorange_m -= 3e6;
+    two[1].pseudorange_m += 6e6;
+    assert_eq!(found(&two), [two[1].satellite, two[6].satellite]);
+    // A gross error, and one of a few hundred metres.
+    two[6].pseudorange_m += 3e6 + 300.0;
+    assert_eq!(found(&two), [two[1].satellite, two[6].satellite]);
+}
+
+#[test]
 fn one_and_several_faults_are_taken_out_and_named() {
     for (faults, count) in [(1, 8), (2, 9), (3, 10)] {
         let mut measurements = epoch(count, 11);

@@ -130,12 +130,24 @@ pub fn solve(
     start_ecef_m: &Vector3<f64>,
 ) -> Result<Solution, NavError> {
     let coarse = position::coarse(&measurements.iter().collect::<Vec<_>>(), start_ecef_m)?;
+    solve_near(measurements, model, &coarse.position_ecef_m)
+}
+
+/// As [`solve`], with the elevation mask laid at `place_ecef_m`, where [`by_geometry`] has found the receiver.
+///
+/// # Errors
+/// As [`solve`].
+pub(crate) fn solve_near(
+    measurements: &[Measurement],
+    model: &MeasurementModel,
+    place_ecef_m: &Vector3<f64>,
+) -> Result<Solution, NavError> {
     let (used, masked): (Vec<&Measurement>, Vec<&Measurement>) =
         measurements.iter().partition(|m| {
-            let predicted = model.predict(&m.state, &coarse, m.receive_time);
+            let predicted = model.predict(&m.state, place_ecef_m, m.receive_time);
             predicted.look.elevation_rad >= model.elevation_mask_rad
         });
-    let fix = position::iterate(&used, model, &coarse)?;
+    let fix = position::iterate(&used, model, place_ecef_m)?;
     let rates: Vec<RateEquation> = used
         .iter()
         .zip(&fix.predicted)
@@ -161,6 +173,20 @@ pub fn solve(
         excluded: Vec::new(),
         consistency: Consistency::Untested,
     })
+}
+
+/// Position (ECEF, m) from geometry alone, whatever the elevations, and the residual of every measurement, m.
+///
+/// # Errors
+/// As [`solve`].
+pub(crate) fn by_geometry(
+    measurements: &[&Measurement],
+    start_ecef_m: &Vector3<f64>,
+) -> Result<(Vector3<f64>, Vec<f64>), NavError> {
+    let fix = position::coarse(measurements, start_ecef_m)?;
+    let pairs = measurements.iter().zip(&fix.predicted);
+    let residuals_m = pairs.map(|(m, p)| m.pseudorange_m - p.pseudorange_m - fix.clock_bias_m);
+    Ok((fix.position_ecef_m, residuals_m.collect()))
 }
 
 fn used_satellites(

@@ -23,18 +23,14 @@ pub(super) struct Fix {
 }
 
 /// Position from geometry alone, from `start` or else from the centre of the earth.
-pub(super) fn coarse(
-    measurements: &[&Measurement],
-    start: &Vector3<f64>,
-) -> Result<Vector3<f64>, NavError> {
+pub(super) fn coarse(measurements: &[&Measurement], start: &Vector3<f64>) -> Result<Fix, NavError> {
     let geometry = MeasurementModel::geometry_only();
-    let fix = match iterate(measurements, &geometry, start) {
+    match iterate(measurements, &geometry, start) {
         Err(NavError::NoConvergence { .. } | NavError::Singular) => {
             iterate(measurements, &geometry, &Vector3::zeros())
         }
         other => other,
-    };
-    fix.map(|fix| fix.position_ecef_m)
+    }
 }
 
 /// Iterates from `start` until the step vanishes.

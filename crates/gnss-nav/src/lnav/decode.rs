@@ -7,7 +7,7 @@ use super::frame_sync;
 use super::reading::Reading;
 use super::subframe::hand_over::HandOver;
 use super::subframe::page::Page;
-use super::timebase::Timebase;
+use super::timebase::{Bearing, Timebase};
 use super::{CODE_PERIODS_PER_BIT, SUBFRAME_BITS};
 use crate::SatelliteId;
 
@@ -28,6 +28,8 @@ pub struct LnavDecoder {
     /// Code period of every bit, modulo a bit.
     phase: Option<u64>,
     timebase: Option<Timebase>,
+    /// Whether two starts of subframes contradict one another: then the next one has to count on.
+    is_doubtful: bool,
     assembly: Assembly,
 }
 
@@ -44,6 +46,7 @@ impl LnavDecoder {
             bits: BitBuffer::default(),
             phase: None,
             timebase: None,
+            is_doubtful: false,
             assembly: Assembly::default(),
         }
     }
@@ -78,6 +81,7 @@ impl LnavDecoder {
             return;
         }
         self.lose(LossReason::Discontinuity, events);
+        self.is_doubtful = false;
         self.bits.restart(number);
         self.phase = phase;
     }
@@ -86,13 +90,21 @@ impl LnavDecoder {
         let Some(found) = frame_sync::search(&self.bits) else {
             return;
         };
-        if let Some(timebase) = self.timebase {
-            if timebase.agrees_with(&found) {
+        if let Some(timebase) = &mut self.timebase {
+            let bearing = timebase.bearing(&found, &self.bits);
+            if matches!(bearing, Bearing::Agrees | Bearing::Data) {
                 return;
             }
+            let unread = timebase.next;
             self.lose(LossReason::Contradiction, events);
-            self.bits.forget_before(timebase.next.min(found.start));
+            self.bits.forget_before(unread.min(found.start));
+            self.is_doubtful = bearing == Bearing::Either;
         }
+        let is_open = self.is_doubtful || frame_sync::has_rival(&self.bits, &found);
+        if is_open && !found.counts_on {
+            return;
+        }
+        self.is_doubtful = false;
         self.timebase = Some(Timebase::new(&found, self.bits.first()));
         events.push(LnavEvent::Sync {
             start_code_period: self.code_period(found.start),

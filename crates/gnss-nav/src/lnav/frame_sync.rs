@@ -9,11 +9,16 @@
 //! (20 choices of three * 64^-3 = 7.6e-5). False sync: 3.5e-12 per bit, 6e-7 per hour of noise.
 //! Words all zero or one count nothing and equal words count once: such filling passes parity, or
 //! fails it, at any offset alike.
+//!
+//! Data are no noise: every word of a message passes parity, and so does a candidate among them. A word starts
+//! with a preamble, and the next one tells a time, once in some 2e4 words, for as long as the message stays. The
+//! neighbours prove nothing then: such a candidate is told from a real one by whether it counts on
+//! (`LnavDecoder`).
 
-use super::SUBFRAME_BITS;
 use super::bit_buffer::BitBuffer;
 use super::parity::{Tail, check_word};
 use super::subframe::hand_over::{HandOver, PREAMBLE, PREAMBLE_BITS};
+use super::{SUBFRAME_BITS, WORD_BITS};
 
 /// Sign of the carrier phase a channel settled on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -53,6 +58,8 @@ pub(super) struct Candidate {
     pub(super) hand_over: HandOver,
     /// From its preamble.
     pub(super) polarity: Polarity,
+    /// Whether the candidate one subframe earlier counts one less.
+    pub(super) counts_on: bool,
 }
 
 /// Good words needed beside words 1 and 2.
@@ -64,35 +71,50 @@ const NEIGHBOURS: [i64; 6] = [-90, -60, -30, 60, 90, 120];
 /// Words of a subframe after which it may become confirmed.
 const WORDS_AT_CONFIRMATION: std::ops::RangeInclusive<i64> = 2..=5;
 
-/// The confirmed start of a subframe, if the latest bit of `bits` completes the proof of one.
+/// The confirmed start of a subframe, if the latest bit of `bits` completes the proof of one; the earliest, if of
+/// several.
 pub(super) fn search(bits: &BitBuffer) -> Option<Candidate> {
     WORDS_AT_CONFIRMATION
+        .rev()
         .filter_map(|words| candidate(bits, bits.end() - 30 * words))
-        .find(|found| is_confirmed(bits, found))
+        .find(|found| found.counts_on || good_neighbours(bits, found.start) >= NEIGHBOURS_NEEDED)
 }
 
 /// The candidate that starts at bit `start`.
-fn candidate(bits: &BitBuffer, start: i64) -> Option<Candidate> {
+pub(super) fn candidate(bits: &BitBuffer, start: i64) -> Option<Candidate> {
+    let (hand_over, polarity) = hand_over(bits, start)?;
+    let before = hand_over_count(bits, start - SUBFRAME_BITS as i64);
+    Some(Candidate {
+        start,
+        hand_over,
+        polarity,
+        counts_on: before.is_some_and(|count| {
+            HandOver::at(count + 1).subframe_count == hand_over.subframe_count
+        }),
+    })
+}
+
+/// Whether there is another candidate among the words before `found`: either may be data.
+pub(super) fn has_rival(bits: &BitBuffer, found: &Candidate) -> bool {
+    let words = 1..(SUBFRAME_BITS / WORD_BITS) as i64;
+    words
+        .map(|words| found.start - words * WORD_BITS as i64)
+        .any(|start| hand_over(bits, start).is_some())
+}
+
+fn hand_over_count(bits: &BitBuffer, start: i64) -> Option<u32> {
+    hand_over(bits, start).map(|(hand_over, _)| hand_over.subframe_count)
+}
+
+/// Words 1 and 2 at bit `start`, if they may be that.
+fn hand_over(bits: &BitBuffer, start: i64) -> Option<(HandOver, Polarity)> {
     let polarity = Polarity::of_preamble(bits, start)?;
     let telemetry = bits.word(start)?;
     check_word(telemetry, polarity.zeros())?;
     let word = bits.word(start + 30)?;
     let data = check_word(word, Tail::of(telemetry))?;
     let hand_over = HandOver::read(data)?;
-    (Tail::of(word) == polarity.zeros()).then_some(Candidate {
-        start,
-        hand_over,
-        polarity,
-    })
-}
-
-fn is_confirmed(bits: &BitBuffer, found: &Candidate) -> bool {
-    let follows = |before: Candidate| {
-        HandOver::at(before.hand_over.subframe_count + 1).subframe_count
-            == found.hand_over.subframe_count
-    };
-    candidate(bits, found.start - SUBFRAME_BITS as i64).is_some_and(follows)
-        || good_neighbours(bits, found.start) >= NEIGHBOURS_NEEDED
+    (Tail::of(word) == polarity.zeros()).then_some((hand_over, polarity))
 }
 
 fn good_neighbours(bits: &BitBuffer, start: i64) -> usize {

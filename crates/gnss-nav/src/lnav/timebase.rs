@@ -1,10 +1,11 @@
 //! Which bit was sent when, and whether that still holds.
 
+use super::bit_buffer::BitBuffer;
 use super::event::LossReason;
-use super::frame_sync::{Candidate, Polarity};
+use super::frame_sync::{self, Candidate, Polarity};
 use super::reading::Reading;
 use super::subframe::hand_over::HandOver;
-use super::{SUBFRAME_BITS, SUBFRAMES_PER_WEEK};
+use super::{SUBFRAME_BITS, SUBFRAMES_PER_WEEK, WORD_BITS};
 
 /// Bits without a hand-over word after which the time is no longer trusted (one minute).
 const LONGEST_SILENCE_BITS: i64 = 10 * SUBFRAME_BITS as i64;
@@ -22,6 +23,21 @@ pub(super) struct Timebase {
     pub(super) next: i64,
     /// First bit of the latest subframe whose hand-over word agreed.
     confirmed: i64,
+    /// Whether two hand-over words at least agree on it.
+    repeated: bool,
+}
+
+/// What a confirmed start of a subframe is to a timebase.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Bearing {
+    /// It is where and when one is expected.
+    Agrees,
+    /// It lies among the words of a subframe that is known: data that look like it.
+    Data,
+    /// It lies among the words of a subframe, and either may be the data.
+    Either,
+    /// It contradicts.
+    Contradicts,
 }
 
 impl Timebase {
@@ -35,6 +51,7 @@ impl Timebase {
             polarity: found.polarity,
             next: found.start - started_before * length,
             confirmed: found.start,
+            repeated: found.counts_on,
         }
     }
 
@@ -45,11 +62,31 @@ impl Timebase {
         HandOver::at(count.rem_euclid(SUBFRAMES_PER_WEEK.into()) as u32)
     }
 
-    /// Whether `found` starts where a subframe does, at its time.
-    pub(super) fn agrees_with(&self, found: &Candidate) -> bool {
+    /// What `found`, confirmed in `bits`, is to it.
+    pub(super) fn bearing(&mut self, found: &Candidate, bits: &BitBuffer) -> Bearing {
         let offset = (found.start - self.start).rem_euclid(SUBFRAME_BITS as i64);
-        let expected = self.hand_over_at(found.start);
-        offset == 0 && expected.subframe_count == found.hand_over.subframe_count
+        if offset == 0 {
+            let agrees = self.expects(found);
+            self.repeated |= agrees && found.start != self.start;
+            return if agrees {
+                Bearing::Agrees
+            } else {
+                Bearing::Contradicts
+            };
+        }
+        if offset % WORD_BITS as i64 != 0 {
+            return Bearing::Contradicts;
+        }
+        let own = frame_sync::candidate(bits, found.start - offset);
+        if self.repeated && own.is_some_and(|own| self.expects(&own)) {
+            Bearing::Data
+        } else {
+            Bearing::Either
+        }
+    }
+
+    fn expects(&self, found: &Candidate) -> bool {
+        self.hand_over_at(found.start).subframe_count == found.hand_over.subframe_count
     }
 
     /// Holds the hand-over word of the subframe that starts at bit `start` against its time.

@@ -5,7 +5,9 @@ use fault_ml::particle::{
     IntegrityRisk, Movement, ParticleMonitor, ParticleParameters, SwarmSettings,
 };
 use fault_ml::{Health, IntegrityMonitor, IntegrityReport, Judgement, SatelliteMeasurement};
-use gnss_nav::integrity::{self, Assured, IntegritySettings, Misfit, Place, ProtectionLevels};
+use gnss_nav::integrity::{
+    self, Assured, IntegritySettings, Misfit, Place, ProtectionLevels, gross,
+};
 use gnss_nav::least_squares::Consistency;
 use gnss_nav::{Measurement, MeasurementModel, NavError, SatelliteId, Solution, least_squares};
 use nalgebra::Vector3;
@@ -121,7 +123,14 @@ impl Monitored {
         model: &MeasurementModel,
         start_ecef_m: &Vector3<f64>,
     ) -> Result<Assured, NavError> {
-        let all = least_squares::solve(measurements, model, start_ecef_m)?;
+        // An error of thousands of kilometres would turn the lines of sight.
+        let gross = gross::search(
+            measurements,
+            start_ecef_m,
+            IntegritySettings::default().most_faults,
+        );
+        let start_ecef_m = &gross.place_ecef_m.unwrap_or(*start_ecef_m);
+        let all = least_squares::solve(&gross.sound, model, start_ecef_m)?;
         self.move_on(time_s, &all);
         if self
             .last_s
@@ -132,13 +141,14 @@ impl Monitored {
                 let mut satellites = all.satellites.iter();
                 satellites.any(|s| s.satellite == m.satellite)
             };
-            let used = measurements.iter().filter(is_used);
+            let used = gross.sound.iter().filter(is_used);
             let seen: Vec<SatelliteMeasurement> = used
                 .map(|m| reduced(m, model, &all.position_ecef_m))
                 .collect();
             self.judge(time_s, &seen);
         }
-        let (aside, rest): (Vec<Measurement>, Vec<Measurement>) = measurements
+        let (aside, rest): (Vec<Measurement>, Vec<Measurement>) = gross
+            .sound
             .iter()
             .partition(|m| self.sets_aside(m.satellite));
         let mut assured = integrity::solve(&rest, model, start_ecef_m, &self.settings)?;
@@ -146,11 +156,13 @@ impl Monitored {
             .iter()
             .map(|m| self.misfit(m, model, &assured.solution));
         assured.misfits.splice(0..0, misfits.collect::<Vec<_>>());
-        let by_monitor = aside.iter().map(|m| m.satellite);
-        assured.solution.excluded.extend(by_monitor);
+        let misfits = gross.misfits(model, &assured.solution);
+        assured.misfits.splice(0..0, misfits);
+        let out = aside.iter().chain(&gross.wrong).map(|m| m.satellite);
+        assured.solution.excluded.extend(out);
         if let Monitor::Particle(monitor) = &self.monitor {
             assured.protection = Some(&assured.solution)
-                .filter(|s| s.consistency == Consistency::Passed)
+                .filter(|s| s.consistency == Consistency::Passed && gross.is_unique)
                 .and_then(|_| levels(monitor));
         }
         Ok(assured)

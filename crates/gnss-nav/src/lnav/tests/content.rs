@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 
-use super::decoder;
+use super::{assert_times, decoder};
 use crate::lnav::test_support::{
     amplitude, decode, encode, ephemerides, ephemerides_in, sample_ephemeris, sample_start,
 };
@@ -166,6 +166,64 @@ fn impossible_orbits_are_refused_by_name() {
 fn reference_times_are_the_nearest() {
     let ephemeris = sample_ephemeris();
     assert_eq!(nearest_time(7200, ephemeris.toe - 300_000.0), ephemeris.toe);
+}
+
+/// An ephemeris of which words 3 and 4 of subframe 3 look like words 1 and 2, for one of four values of `low`, which
+/// makes word 4 end in zeros. Found by proptest.
+fn like_a_hand_over(low: u32) -> Ephemeris {
+    let (count, id) = (12_345, 1);
+    let word_4 = (count + 1) << 7 | id << 2 | low;
+    let (cic, omega0) = (0x8B46_u16 as i16, (0x8A << 24 | word_4) as i32);
+    Ephemeris {
+        sqrt_a: 5150.0,
+        eccentricity: 0.049,
+        cic_rad: f64::from(cic) * 2_f64.powi(-29),
+        omega0_rad: std::f64::consts::PI * f64::from(omega0) * 2_f64.powi(-31),
+        ..sample_ephemeris()
+    }
+}
+
+/// Of which words 3 and 4 of subframe 2 do: an issue of data whose number is that of the preamble.
+fn issue_like_a_preamble(low: u32) -> Ephemeris {
+    let word_4 = (12_345 + 1) << 7 | 1 << 2 | low;
+    let (delta_n, m0) = ((word_4 >> 8) as i16, (word_4 << 24) as i32);
+    Ephemeris {
+        iodc: 0x8B,
+        iode: 0x8B,
+        delta_n_rad_s: std::f64::consts::PI * f64::from(delta_n) * 2_f64.powi(-43),
+        m0_rad: std::f64::consts::PI * f64::from(m0) * 2_f64.powi(-31),
+        ..sample_ephemeris()
+    }
+}
+
+#[test]
+fn data_that_look_like_the_start_of_a_subframe_do_not_end_sync() {
+    for low in 0..4 {
+        for ephemeris in [like_a_hand_over(low), issue_like_a_preamble(low)] {
+            let ephemeris = quantise(&ephemeris).unwrap();
+            let encoder = LnavEncoder::new(&ephemeris).unwrap();
+            let bits = encode(&encoder, sample_start(), 3000);
+            for skipped in [0, 300, 600] {
+                let late = bits[skipped..].iter().copied();
+                let events = decode(&mut decoder(), 0, late.map(amplitude));
+                assert_times(&events, skipped, 0);
+                let losses = events
+                    .iter()
+                    .filter(|(_, event)| matches!(event, LnavEvent::SyncLost { .. }));
+                // Where reception begins with the very subframe, the next one has to tell.
+                let most = usize::from(skipped > 0);
+                assert!(losses.count() <= most, "{low} {skipped}");
+                let last = if skipped == 0 { 899 } else { 2399 - skipped };
+                // Parts from before the second frame count as well.
+                let found = ephemerides_in(&events);
+                assert_eq!(found.len(), 1);
+                assert!(
+                    found[0].0 <= last && found[0].1 == ephemeris,
+                    "{low} {skipped}"
+                );
+            }
+        }
+    }
 }
 
 proptest! {

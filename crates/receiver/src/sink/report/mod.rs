@@ -50,6 +50,9 @@ pub struct Report {
     vertical_error_m: Series,
     /// Horizontal, then vertical.
     stanford: [Stanford; 2],
+    /// Whether the run went over to vector tracking, which states no protection levels: those of the few epochs before
+    /// are no picture of the run.
+    is_vector: bool,
 }
 
 #[derive(Debug, Default)]
@@ -79,6 +82,7 @@ impl Report {
             horizontal_error_m: Series::default(),
             vertical_error_m: Series::default(),
             stanford: Default::default(),
+            is_vector: false,
         })
     }
 
@@ -98,7 +102,8 @@ impl Report {
         let p = &error.position_enu_m;
         self.horizontal_error_m.push(error.time_s, p.x.hypot(p.y));
         self.vertical_error_m.push(error.time_s, p.z);
-        if let Some([horizontal_m, vertical_m]) = error.protection_m {
+        let stated = error.protection_m.filter(|_| !self.is_vector);
+        if let Some([horizontal_m, vertical_m]) = stated {
             let [horizontal, vertical] = &mut self.stanford;
             horizontal.push(p.x.hypot(p.y), horizontal_m);
             vertical.push(p.z, vertical_m);
@@ -153,6 +158,12 @@ impl Report {
     }
 
     fn event(&mut self, event: &Event) {
+        self.is_vector |= matches!(
+            event.kind,
+            EventKind::ModeSwitched {
+                to: LoopMembership::Vector
+            }
+        );
         let what = match &event.kind {
             EventKind::Excluded { .. } => "excluded",
             EventKind::Readmitted => "readmitted",
@@ -227,6 +238,36 @@ mod tests {
         for foreign in ["http://", "https://", "<script", "NaN"] {
             assert!(!text.contains(foreign), "{foreign}");
         }
+    }
+
+    /// The page of a run of one epoch, with these events.
+    fn page_of(events: &[EventKind]) -> String {
+        let folder = tempfile::tempdir().unwrap();
+        let mut report = Report::create(folder.path(), "run").unwrap();
+        for kind in events {
+            report.record(&Record::Event(Event {
+                time_s: 0.5,
+                satellite: None,
+                kind: kind.clone(),
+            }));
+        }
+        report.error(&SolutionError {
+            time_s: 1.0,
+            position_enu_m: Vector3::new(1.0, -2.0, 3.0),
+            velocity_enu_mps: None,
+            protection_m: Some([12.0, 20.0]),
+        });
+        report
+            .finish(&SummaryBuilder::default().finish(1.0, None))
+            .unwrap();
+        std::fs::read_to_string(folder.path().join(FILE_NAME)).unwrap()
+    }
+
+    #[test]
+    fn protection_is_drawn_of_runs_that_state_it() {
+        assert!(page_of(&[]).contains("Horizontal protection"));
+        let to = LoopMembership::Vector;
+        assert!(!page_of(&[EventKind::ModeSwitched { to }]).contains("Horizontal protection"));
     }
 
     #[test]
