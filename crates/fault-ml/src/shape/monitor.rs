@@ -32,7 +32,7 @@ pub struct ShapeSettings {
     /// 0.0015, that is 0.4 m; on samples at 4 MHz of eight satellites the mean was seen to wander by 0.009 in 80
     /// minutes of their channels.
     pub floor_chips: f64,
-    /// Steps seen before the first verdict, at least 2. Default 100: the deviation is then known to 9 %.
+    /// Steps seen before the first verdict, at least 2. Default 20, that is 0.2 s: the deviation is then known to 20 %.
     pub warm_up: u32,
 }
 
@@ -42,7 +42,7 @@ impl Default for ShapeSettings {
             lambda: 0.02,
             width: 7.0,
             floor_chips: 0.0015,
-            warm_up: 100,
+            warm_up: 20,
         }
     }
 }
