@@ -1,7 +1,9 @@
 //! The chart on the shape of the correlation, in the receiver.
 #![allow(clippy::unwrap_used, reason = "a failure here is a failed test")]
 
-use end_to_end_tests::{STATIC, number, receive as receive_recording, test_data};
+use end_to_end_tests::{
+    FLIGHT, POCKET_4MHZ, POCKET_12MHZ, STATIC, number, receive as receive_recording, test_data,
+};
 use fault_ml::shape::ShapeSettings;
 use gnss_nav::SatelliteId;
 use receiver::pipeline::{Policy, Settings, ShapeWatching, VectorSettings};
@@ -147,4 +149,26 @@ fn healthy_channels_of_a_recording_do_not_alarm() {
     }
     // Nine satellites, ten times a second, but for their first seconds.
     assert!(judged > 4_000, "{judged}");
+}
+
+#[test]
+fn short_recordings_are_judged_and_their_healthy_channels_do_not_alarm() {
+    let Some(data) = test_data() else { return };
+    let mut judged = Vec::new();
+    for recording in [FLIGHT, POCKET_4MHZ, POCKET_12MHZ] {
+        let run = receive_recording(&data, &recording, &["--monitor", "ewma"]);
+        let rows = run.rows("channels.csv");
+        let scored = rows.iter().filter(|row| !row["score_ewma"].is_empty());
+        let mut channels = std::collections::BTreeSet::new();
+        for row in scored {
+            let (score, limit) = (number(row, "score_ewma"), number(row, "threshold_ewma"));
+            assert!(score <= limit, "{}: {row:?}", recording.reference);
+            channels.insert(row["prn"].clone());
+        }
+        judged.push((recording.reference, channels.len()));
+    }
+    assert!(
+        judged.iter().all(|(_, channels)| *channels > 0),
+        "{judged:?}"
+    );
 }

@@ -207,7 +207,9 @@ fn main() -> ExitCode {
 fn positive(text: &str) -> Result<f64, String> {
     let value: f64 = text.parse().map_err(|_| "no number".to_owned())?;
     let is_positive = value.is_finite() && value > 0.0;
-    is_positive.then_some(value).ok_or_else(|| "expected above 0".to_owned())
+    is_positive
+        .then_some(value)
+        .ok_or_else(|| "expected above 0".to_owned())
 }
 
 const fn verdict(holds: bool) -> ExitCode {

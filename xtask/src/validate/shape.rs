@@ -54,7 +54,9 @@ impl fmt::Display for Table {
             "Largest of the taps, sums of 1 ms, loop of 3 Hz, lambda 0.02; limits in chips:\n"
         )?;
         write!(f, "| C/N0 (dB-Hz) | hours | limit | alarms |")?;
-        RATES.iter().try_for_each(|r| write!(f, " passed {r} an hour |"))?;
+        RATES
+            .iter()
+            .try_for_each(|r| write!(f, " passed {r} an hour |"))?;
         writeln!(f, " passed once |\n|---|---|---|---|---|---|---|---|")?;
         for (tail, alarms) in self.tails.iter().zip(&self.alarms.alarms) {
             let (cn0, hours) = (tail.cn0_dbhz, tail.hours);

@@ -129,12 +129,15 @@ impl Table {
     /// Whether both monitors together leave so little of the error without any.
     #[must_use]
     pub fn holds(&self) -> bool {
-        [&self.stand_alone, &self.assisted].into_iter().all(|errors| {
-            let ([none, ..], [.., both]) = (&errors[..], &errors[..]) else {
-                return false;
-            };
-            both.horizontal_m <= LEFT * none.horizontal_m && both.position_m <= LEFT * none.position_m
-        })
+        [&self.stand_alone, &self.assisted]
+            .into_iter()
+            .all(|errors| {
+                let ([none, ..], [.., both]) = (&errors[..], &errors[..]) else {
+                    return false;
+                };
+                both.horizontal_m <= LEFT * none.horizontal_m
+                    && both.position_m <= LEFT * none.position_m
+            })
     }
 }
 
@@ -149,7 +152,10 @@ impl fmt::Display for Table {
             f,
             "| start | monitor | horizontal | below none (%) | 3-D | below none (%) | weighted |\n|---|---|---|---|---|---|---|"
         )?;
-        for (start, errors) in [("stand-alone", &self.stand_alone), ("assisted", &self.assisted)] {
+        for (start, errors) in [
+            ("stand-alone", &self.stand_alone),
+            ("assisted", &self.assisted),
+        ] {
             let Some(none) = errors.first() else { continue };
             for (watched, e) in ALL.iter().zip(errors) {
                 let below = |error: f64, none: f64| 100.0 * (1.0 - error / none);

@@ -36,7 +36,9 @@ fn maps(study: &Study) -> Vec<Check> {
 
 fn detection(study: &Study) -> Vec<Check> {
     let mut checks = Vec::new();
-    for (level, [paper, hourly, hundred]) in [("sums", &study.detection), ("samples", &study.sampled)] {
+    for (level, [paper, hourly, hundred]) in
+        [("sums", &study.detection), ("samples", &study.sampled)]
+    {
         let name = |what| format!("two reflections on {level}, {what}");
         let early = |seen: &Detection| seen.early_alarms as f64;
         let what = "limit of an alarm in a hundred hours, runs alarmed before the onset";
@@ -49,10 +51,20 @@ fn detection(study: &Study) -> Vec<Check> {
         let of = |part| 1e3 * quantile(&hourly.delays_s, part);
         let coefficient = quantile(&hourly.correlations, 0.5);
         checks.extend([
-            Check::at_most(name("runs alarmed before the onset"), early(hourly), 0.0, ""),
+            Check::at_most(
+                name("runs alarmed before the onset"),
+                early(hourly),
+                0.0,
+                "",
+            ),
             Check::at_most(name("median delay"), of(0.5), 130.0, "ms"),
             Check::at_most(name("95th percentile of the delay"), of(0.95), 180.0, "ms"),
-            Check::at_least(name("median correlation of Z with the error"), coefficient, 0.91, ""),
+            Check::at_least(
+                name("median correlation of Z with the error"),
+                coefficient,
+                0.91,
+                "",
+            ),
         ]);
     }
     checks

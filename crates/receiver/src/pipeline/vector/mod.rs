@@ -43,8 +43,8 @@ use acceleration::Velocities;
 use filter::from_solution;
 pub(super) use monitors::Monitor;
 use monitors::deviations;
-use scatter::Scatter;
 pub(super) use report::{change, observations};
+use scatter::Scatter;
 pub use settings::{FilterKind, MeasurementNoise, Policy, VectorSettings};
 pub(super) use steering::steering;
 use watch::Watch;
@@ -446,7 +446,9 @@ impl VectorTracking {
         let weighted = too_few::weight(&mut dispositions, &weighted);
         if (weighted > 0) != self.too_few_left {
             self.too_few_left = weighted > 0;
-            epoch.events.push((None, EventKind::TooFewLeft { weighted }));
+            epoch
+                .events
+                .push((None, EventKind::TooFewLeft { weighted }));
         }
         Ok(dispositions)
     }

@@ -34,7 +34,11 @@ mod tests {
     fn told(satellites: u8, faulty: u8) -> Vec<(SatelliteId, Disposition)> {
         let told = |prn| {
             let is_faulty = prn <= faulty;
-            let disposition = if is_faulty { Disposition::Exclude } else { Disposition::Use };
+            let disposition = if is_faulty {
+                Disposition::Exclude
+            } else {
+                Disposition::Use
+            };
             (SatelliteId::gps(prn), disposition)
         };
         (1..=satellites).map(told).collect()
@@ -52,7 +56,9 @@ mod tests {
     #[test]
     fn what_it_cannot_do_without_is_weighted() {
         let mut all = told(8, 5);
-        let weighted: Vec<_> = (0..8).map(|k| if k < 5 { WEIGHTED } else { Disposition::Use }).collect();
+        let weighted: Vec<_> = (0..8)
+            .map(|k| if k < 5 { WEIGHTED } else { Disposition::Use })
+            .collect();
         assert_eq!(weight(&mut all, &weighted), 5);
         assert!(all.iter().map(|(_, d)| *d).eq(weighted));
     }
