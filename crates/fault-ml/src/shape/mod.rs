@@ -22,7 +22,7 @@ mod run_length;
 
 pub use balance::FlankBalance;
 pub use chart::{ChartSettings, EwmaChart};
-pub use closed_loop::{closed_loop_chart, hourly_chart};
+pub use closed_loop::closed_loop_chart;
 pub use monitor::{Shape, ShapeMonitor, ShapeSettings};
 pub use observable::{SHAPE_TAPS_CHIPS, fitted_peak, largest_tap};
 pub use run_length::average_run_length;

@@ -210,8 +210,7 @@ fn two_reflections(study: &Study) -> String {
         );
     }
     text + "\nSix deviations alarm by chance once in some twelve minutes of a closed loop (below): of 60 runs of 2 s before the onset 0.2 are expected to. As many do \
-            at their very first values, where (9) and (10) take T for normal and one of 0.3 chip is outside. The other limits (fault_ml::shape::hourly_chart, \
-            closed_loop_chart) come from the tail of simulated closed loops of other seeds, and judge from 0.2 s on, as they were counted.\n\nOn samples (5 MHz, 8 bits, complex, \
+            at their very first values, where (9) and (10) take T for normal and one of 0.3 chip is outside. The other limits come from the tail of simulated closed loops of other seeds, and judge from 0.2 s on, as they were counted.\n\nOn samples (5 MHz, 8 bits, complex, \
             no other satellite) the whole receiver tracks the satellite alone with the paper's settings; the error there is that of such a loop without noise.\n\n"
 }
 

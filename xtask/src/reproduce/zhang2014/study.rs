@@ -1,7 +1,7 @@
 //! Everything that is simulated.
 
 use anyhow::Result;
-use fault_ml::shape::{ChartSettings, closed_loop_chart, hourly_chart};
+use fault_ml::shape::{ChartSettings, closed_loop_chart};
 
 use super::correlation::Correlation;
 use super::delays::{Delays, delays};
@@ -58,11 +58,10 @@ fn detections(runs: &[Run]) -> Result<[Detection; 3]> {
         let charted: Vec<Run> = charted.collect::<Result<_>>()?;
         Ok(Detection::of(&charted, unjudged))
     };
-    let cn0_dbhz = deviation::COMPLEX_DBHZ;
     Ok([
         of(ChartSettings::default(), 0)?,
-        of(hourly_chart(cn0_dbhz), rays::UNJUDGED)?,
-        of(closed_loop_chart(cn0_dbhz), rays::UNJUDGED)?,
+        of(rays::hourly_chart(), rays::UNJUDGED)?,
+        of(closed_loop_chart(deviation::COMPLEX_DBHZ), rays::UNJUDGED)?,
     ])
 }
 
