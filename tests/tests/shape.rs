@@ -1,7 +1,11 @@
 //! The chart on the shape of the correlation, in the receiver.
 #![allow(clippy::unwrap_used, reason = "a failure here is a failed test")]
 
-use end_to_end_tests::{STATIC, number, receive as receive_recording, test_data};
+use std::collections::BTreeSet;
+
+use end_to_end_tests::{
+    FLIGHT, POCKET_4MHZ, POCKET_12MHZ, STATIC, number, receive as receive_recording, test_data,
+};
 use fault_ml::shape::ShapeSettings;
 use gnss_nav::SatelliteId;
 use receiver::pipeline::{Policy, Settings, ShapeWatching, VectorSettings};
@@ -147,4 +151,23 @@ fn healthy_channels_of_a_recording_do_not_alarm() {
     }
     // Nine satellites, ten times a second, but for their first seconds.
     assert!(judged > 4_000, "{judged}");
+}
+
+#[test]
+fn half_a_second_is_long_enough_to_judge_and_no_healthy_channel_alarms() {
+    let Some(data) = test_data() else { return };
+    for (recording, expected) in [(POCKET_4MHZ, 8), (POCKET_12MHZ, 0), (FLIGHT, 0)] {
+        let run = receive_recording(&data, &recording, &["--monitor", "ewma"]);
+        let mut judged = BTreeSet::new();
+        for row in run.rows("channels.csv") {
+            if row["score_ewma"].is_empty() {
+                continue;
+            }
+            let (score, limit) = (number(&row, "score_ewma"), number(&row, "threshold_ewma"));
+            assert!(score <= limit, "{}: {row:?}", recording.reference);
+            judged.insert(row["prn"].clone());
+        }
+        // The others last for 0.1 s, the chart takes 0.2 s to know its deviation.
+        assert_eq!(judged.len(), expected, "{}", recording.reference);
+    }
 }

@@ -16,7 +16,7 @@ use xtask::tidy::{Severity, tidy, workspace_root};
 use xtask::train::{Trained, command as training};
 use xtask::validate::threshold::Thresholds;
 use xtask::validate::{
-    consistency, front_ends, generalisation, levels, monitors, sensitivity, starts,
+    consistency, front_ends, generalisation, levels, monitors, sensitivity, shape, starts, urban,
 };
 
 #[derive(Debug, Parser)]
@@ -172,6 +172,19 @@ enum Validation {
         #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u32).range(120..))]
         runs: u32,
     },
+    /// False alarms of the chart on the shape of the correlation in closed loops: the paper's with its table of limits,
+    /// and the receiver's as it begins
+    Shape {
+        /// Simulated over all C/N0, channel-hours
+        #[arg(long, value_name = "H", default_value_t = 378.0, value_parser = positive)]
+        hours: f64,
+    },
+    /// What the monitors make of a street between houses, by several seeds
+    Urban {
+        /// Runs of each receiver, stand-alone and assisted
+        #[arg(long, value_name = "N", default_value_t = 6, value_parser = clap::value_parser!(u16).range(1..))]
+        seeds: u16,
+    },
     /// The C/N0 at which channels are lost, steered by one filter against loops that share nothing
     Threshold {
         /// Runs of each point
@@ -189,6 +202,14 @@ fn main() -> ExitCode {
             ExitCode::from(2)
         }
     }
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    let value: f64 = text.parse().map_err(|_| "no number".to_owned())?;
+    let is_positive = value.is_finite() && value > 0.0;
+    is_positive
+        .then_some(value)
+        .ok_or_else(|| "expected above 0".to_owned())
 }
 
 const fn verdict(holds: bool) -> ExitCode {
@@ -240,6 +261,14 @@ fn validate(validation: &Validation, out: &mut impl Write) -> Result<ExitCode> {
             (table.to_string(), table.holds())
         }
         Validation::Generalisation { runs } => (generalisation::table(*runs)?.to_string(), true),
+        Validation::Shape { hours } => {
+            let table = shape::table(*hours)?;
+            (table.to_string(), table.holds())
+        }
+        Validation::Urban { seeds } => {
+            let table = urban::table(usize::from(*seeds))?;
+            (table.to_string(), table.holds())
+        }
         Validation::Threshold { runs } => {
             let thresholds = Thresholds::sweep(usize::from(*runs))?;
             (thresholds.to_string(), thresholds.holds())

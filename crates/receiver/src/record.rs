@@ -416,6 +416,12 @@ pub enum EventKind {
         /// By how much they are longer, m.
         size_m: f64,
     },
+    /// Without the satellites found faulty too few would be left: they are weighted from here on, or left out
+    /// again.
+    TooFewLeft {
+        /// How many are weighted; none where they are left out again.
+        weighted: usize,
+    },
     /// Most channels contradicted the filter; it starts anew from least squares.
     FilterReset {
         /// How many.

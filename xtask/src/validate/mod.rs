@@ -6,8 +6,10 @@ pub mod generalisation;
 pub mod levels;
 pub mod monitors;
 pub mod sensitivity;
+pub mod shape;
 pub mod starts;
 pub mod threshold;
+pub mod urban;
 
 /// A verdict in words.
 pub(crate) const fn verdict(holds: bool) -> &'static str {

@@ -5,6 +5,16 @@ use super::observable::SHAPE_TAPS_CHIPS;
 /// Weight of a new shape in the mean that the slopes are taken from: some 200 shapes.
 const SHAPE_WEIGHT: f64 = 0.005;
 
+/// Weight of the newest of `count` values in their mean, but no less than `least`; divides only where it
+/// has to, as divisions are most of what a step costs.
+pub(super) fn newest_weight(count: f64, least: f64) -> f64 {
+    if count * least < 1.0 {
+        count.recip()
+    } else {
+        least
+    }
+}
+
 /// An observable between the taps that is blind to where the replica stands.
 ///
 /// A pair of taps balances where the peak is, if nothing distorts it. A reflection moves that point,
@@ -46,7 +56,7 @@ impl FlankBalance {
         let inner = 2.5 * scale * (p - e2 + p - l2);
         let outer = 2.5 * scale * (e2 - e4 + l2 - l4);
         self.shapes += 1.0;
-        let weight = self.shapes.recip().max(SHAPE_WEIGHT);
+        let weight = newest_weight(self.shapes, SHAPE_WEIGHT);
         self.inner_slope += weight * (inner - self.inner_slope);
         self.outer_slope += weight * (outer - self.outer_slope);
         let is_peak = self.inner_slope > 0.0 && self.outer_slope > 0.0;

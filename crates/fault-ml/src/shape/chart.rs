@@ -33,12 +33,12 @@ impl ChartSettings {
     #[must_use]
     pub fn limit(&self, steps: u32) -> f64 {
         let left = (1.0 - self.lambda).powf(2.0 * f64::from(steps));
-        self.width * self.sigma * self.mean_deviation(left)
+        self.width * self.sigma * self.mean_variance(left).sqrt()
     }
 
-    /// Deviation of the mean in units of sigma, with `left` of the square of the target's weight.
-    fn mean_deviation(&self, left: f64) -> f64 {
-        (self.lambda / (2.0 - self.lambda) * (1.0 - left)).sqrt()
+    /// Variance of the mean over that of a value, with `left` of the square of the target's weight.
+    fn mean_variance(&self, left: f64) -> f64 {
+        self.lambda / (2.0 - self.lambda) * (1.0 - left)
     }
 }
 
@@ -103,13 +103,13 @@ impl EwmaChart {
     /// Half the distance of the limits at this step: upper and lower limit lie so far from the target.
     #[must_use]
     pub fn limit(&self) -> f64 {
-        self.limit_of(self.settings.sigma)
+        self.settings.width * self.settings.sigma * self.settings.mean_variance(self.left).sqrt()
     }
 
-    /// The same for values of another deviation than was set.
+    /// Variance of the mean at this step (8), for values of another `variance` than was set.
     #[must_use]
-    pub fn limit_of(&self, sigma: f64) -> f64 {
-        self.settings.width * sigma * self.settings.mean_deviation(self.left)
+    pub fn mean_variance_of(&self, variance: f64) -> f64 {
+        variance * self.settings.mean_variance(self.left)
     }
 
     /// Whether the mean is outside its limits.

@@ -1,6 +1,6 @@
 //! The chart as a monitor of a channel.
 
-use super::balance::FlankBalance;
+use super::balance::{FlankBalance, newest_weight};
 use super::chart::{ChartSettings, EwmaChart};
 use super::observable::SHAPE_TAPS_CHIPS;
 use crate::error::within;
@@ -32,7 +32,7 @@ pub struct ShapeSettings {
     /// 0.0015, that is 0.4 m; on samples at 4 MHz of eight satellites the mean was seen to wander by 0.009 in 80
     /// minutes of their channels.
     pub floor_chips: f64,
-    /// Steps seen before the first verdict, at least 2. Default 100: the deviation is then known to 9 %.
+    /// Steps seen before the first verdict, at least 2. Default 20, that is 0.2 s: the deviation is then known to 20 %.
     pub warm_up: u32,
 }
 
@@ -42,7 +42,7 @@ impl Default for ShapeSettings {
             lambda: 0.02,
             width: 7.0,
             floor_chips: 0.0015,
-            warm_up: 100,
+            warm_up: 20,
         }
     }
 }
@@ -105,7 +105,7 @@ impl ShapeMonitor {
         self.steps = self.steps.saturating_add(1);
         if let Some(previous) = self.previous.replace(observed) {
             let differences = f64::from(self.steps - 1);
-            let weight = differences.recip().max(DEVIATION_WEIGHT);
+            let weight = newest_weight(differences, DEVIATION_WEIGHT);
             let square = 0.5 * (observed - previous) * (observed - previous);
             self.variance += weight * (square - self.variance);
         }
@@ -142,9 +142,9 @@ impl ChannelMonitor for ShapeMonitor {
             .checked_sub(self.steps)
             .filter(|r| *r > 0)
         else {
-            let noise = self.chart.limit_of(self.variance.sqrt());
-            let floor = self.settings.width * self.settings.floor_chips;
-            let limit = (noise * noise + floor * floor).sqrt();
+            let floor = self.settings.floor_chips;
+            let variance = self.chart.mean_variance_of(self.variance) + floor * floor;
+            let limit = self.settings.width * variance.sqrt();
             return Ok(ChannelVerdict::Judged(Judgement::new(
                 self.chart.distance(),
                 limit,

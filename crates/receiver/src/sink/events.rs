@@ -89,6 +89,9 @@ enum Detail<'a> {
     ClockStep {
         size_m: f64,
     },
+    TooFewLeft {
+        weighted: usize,
+    },
     Alarm {
         monitor: &'a str,
         score: f64,
@@ -133,6 +136,7 @@ pub const fn kind_name(kind: &EventKind) -> &'static str {
         EventKind::IntegrityChanged { .. } => "integrity_changed",
         EventKind::FilterReset { .. } => "filter_reset",
         EventKind::ClockStep { .. } => "clock_step",
+        EventKind::TooFewLeft { .. } => "too_few_left",
     }
 }
 
@@ -172,6 +176,9 @@ fn detail(kind: &EventKind) -> Detail<'_> {
         EventKind::ModeSwitched { to } => Detail::Mode { to: to.name() },
         EventKind::ClockStep { size_m } => Detail::ClockStep {
             size_m: rounded(*size_m, 3),
+        },
+        EventKind::TooFewLeft { weighted } => Detail::TooFewLeft {
+            weighted: *weighted,
         },
         EventKind::FilterReset { channels } => Detail::Reset {
             channels: *channels,

@@ -5,9 +5,9 @@ use fault_ml::ChannelMonitor;
 use fault_ml::metrics::RateInterval;
 use fault_ml::shape::{Shape, ShapeMonitor, ShapeSettings, closed_loop_chart};
 
-use super::channel::Channel;
 use super::closed_loop::{ClosedLoop, Setting};
 use super::correlation::Correlation;
+use super::tail::{Tail, tails};
 use crate::judged::in_parallel;
 
 /// Signal strengths, dB-Hz.
@@ -63,18 +63,41 @@ pub fn of_monitor(correlation: &Correlation) -> Result<FalseAlarms> {
 /// # Errors
 /// Where a chart's settings are impossible.
 pub fn of_paper() -> Result<FalseAlarms> {
-    let alarms = in_parallel(CN0_DBHZ.len(), |k| {
-        let setting = Setting::paper(CN0_DBHZ[k]);
-        let steps = PAPER_HOURS * 3600.0 / setting.integration_s;
-        let chart = closed_loop_chart(CN0_DBHZ[k]);
-        let mut channel = Channel::new(setting, chart, 9_100 + k as u64)?;
-        // Quantised values pass the narrow limits of a chart that has just begun.
-        (0..200).for_each(|_| _ = channel.step(&[]));
-        count(steps as usize, || Ok(channel.step(&[]).is_outside()))
-    })?;
-    Ok(FalseAlarms {
-        alarms,
-        hours: PAPER_HOURS,
+    let tails = tails(PAPER_HOURS, 9_100)?;
+    Ok(by_table(&tails))
+}
+
+/// Of the paper's chart over `tails`, with the limits of closed loops.
+#[must_use]
+pub fn by_table(tails: &[Tail]) -> FalseAlarms {
+    let alarms = |t: &Tail| t.alarms(closed_loop_chart(t.cn0_dbhz).limit(u32::MAX));
+    FalseAlarms {
+        alarms: tails.iter().map(alarms).collect(),
+        hours: tails.first().map_or(0.0, |t| t.hours),
+    }
+}
+
+/// Alarms of the receiver's monitor within two seconds of its beginning, over `starts` beginnings at each of
+/// [`CN0_DBHZ`].
+///
+/// # Errors
+/// Where a monitor fails.
+pub fn of_starts(starts: usize) -> Result<Vec<usize>> {
+    const STEPS: usize = 200;
+    in_parallel(CN0_DBHZ.len(), |k| {
+        let setting = Setting::receiver(CN0_DBHZ[k], Correlation::Triangle);
+        let mut closed = ClosedLoop::new(setting, 9_200 + k as u64);
+        let mut monitor = ShapeMonitor::new(ShapeSettings::default())?;
+        let mut alarmed = 0;
+        for _ in 0..starts {
+            monitor.reset();
+            let alarms = count(STEPS, || {
+                let magnitudes = closed.step(&[]).shape;
+                Ok(monitor.step(&Shape { magnitudes })?.is_faulty())
+            })?;
+            alarmed += usize::from(alarms > 0);
+        }
+        Ok(alarmed)
     })
 }
 

@@ -15,6 +15,7 @@ pub mod run_lengths;
 pub mod samples;
 pub mod study;
 pub mod table;
+pub mod tail;
 #[cfg(test)]
 mod tests;
 pub mod urban;

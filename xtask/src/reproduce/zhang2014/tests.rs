@@ -59,7 +59,7 @@ fn the_chart_sees_both_reflections_and_nothing_before() {
     let runs: Vec<_> = (0..8)
         .map(|seed| rays::run(ChartSettings::default(), seed).unwrap())
         .collect();
-    let seen = Detection::of(&runs);
+    let seen = Detection::of(&runs, 0);
     assert_eq!(seen.early_alarms, 0);
     // The bounds, of which sixty seeds are in the report.
     assert!(quantile(&seen.delays_s, 0.5) < 0.13, "{:?}", seen.delays_s);

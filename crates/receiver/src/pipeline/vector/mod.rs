@@ -13,6 +13,7 @@ mod restart;
 mod scatter;
 mod settings;
 mod steering;
+mod too_few;
 mod watch;
 
 use std::collections::BTreeMap;
@@ -149,6 +150,8 @@ pub(super) struct VectorTracking {
     geometry: Option<EpochGeometry>,
     /// Channels whose message tells another time, at the last epoch.
     contradicting: usize,
+    /// Whether satellites found faulty were weighted at the last epoch, as too few would have been left.
+    too_few_left: bool,
     velocities: Velocities,
     acceleration_mps2: Vector3<f64>,
     /// The last epoch.
@@ -185,6 +188,7 @@ impl VectorTracking {
             watches: BTreeMap::new(),
             geometry: None,
             contradicting: 0,
+            too_few_left: false,
             velocities: Velocities::default(),
             acceleration_mps2: Vector3::zeros(),
             tick: around.tick,
@@ -429,7 +433,7 @@ impl VectorTracking {
             let watch = self.watch(satellite);
             let change = watch.judge(&step, shape)?;
             let disposition = watch.disposition(policy, variance_m2.sqrt());
-            weighted.push(watch.weighted(variance_m2.sqrt()).unwrap_or(disposition));
+            weighted.push(watch.weighted(variance_m2.sqrt()));
             dispositions.push((satellite, disposition));
             if let Some(change) = change {
                 let kind = report::change(&change, policy);
@@ -439,10 +443,12 @@ impl VectorTracking {
                 }
             }
         }
-        let left = dispositions.iter().filter(|d| d.1 != Disposition::Exclude);
-        if left.count() < NEEDED {
-            let each = dispositions.iter_mut().zip(weighted);
-            each.for_each(|((_, told), weighted)| *told = weighted);
+        let weighted = too_few::weight(&mut dispositions, &weighted);
+        if (weighted > 0) != self.too_few_left {
+            self.too_few_left = weighted > 0;
+            epoch
+                .events
+                .push((None, EventKind::TooFewLeft { weighted }));
         }
         Ok(dispositions)
     }

@@ -81,11 +81,11 @@ impl Watch {
         self.belief.disposition(policy, error_over_sigma)
     }
 
-    /// What the filter may do with the satellite where it cannot do without, if it is suspended and the shape of
-    /// its correlation says how much it errs.
-    pub(super) fn weighted(&self, sigma_m: f64) -> Option<Disposition> {
-        self.belief
-            .weighted(self.shape_error_m.map(|e| e / sigma_m))
+    /// What the filter may do with the satellite where it cannot do without: weighted where it is suspended,
+    /// by how much the shape of its correlation says that it errs or else by the usual factor.
+    pub(super) fn weighted(&self, sigma_m: f64) -> Disposition {
+        let variance_factor = Policy::VARIANCE_FACTOR;
+        self.disposition(Policy::Deweight { variance_factor }, sigma_m)
     }
 
     /// Monitor, score and threshold of the last epoch, of each that judged.

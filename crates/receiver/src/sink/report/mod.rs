@@ -172,6 +172,8 @@ impl Report {
             EventKind::FixLost => "fix lost",
             EventKind::Alarm { .. } => "alarm",
             EventKind::FilterReset { .. } => "filter reset",
+            EventKind::TooFewLeft { weighted: 0 } => "faulty left out",
+            EventKind::TooFewLeft { .. } => "faulty weighted",
             EventKind::ModeSwitched {
                 to: LoopMembership::Vector,
             } => "vector tracking",
