@@ -159,10 +159,10 @@ impl Accuracy {
 }
 
 /// Windows that a layer is trained on, and a machine: the cost of its kernel grows with their square.
-const LAYER_WINDOWS: usize = 2400;
+const LAYER_WINDOWS: usize = 6000;
 const MACHINE_WINDOWS: usize = 1200;
 /// Passes over them at most.
-const PASSES: usize = 12;
+const PASSES: usize = 20;
 /// One window in so many is judged; a number that divides no other period here.
 const JUDGED_EVERY: usize = 7;
 /// The paper's number of innovations of the LSTM.

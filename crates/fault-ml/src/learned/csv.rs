@@ -203,6 +203,7 @@ mod tests {
                 step.innovation.rate_mps = 0.0;
                 step.innovation.rate_sigma_mps = f64::INFINITY;
                 step.given_others.code_m = 0.3;
+                step.tap_ratios = None;
             }
             LabelledStep {
                 time_s,
@@ -236,15 +237,25 @@ mod tests {
 
     #[test]
     fn a_bad_row_is_named() {
-        let good = "1,7,ramp,0.1,1,8,0.1,0.2,1,8,,,45,600,0";
+        let good = "1,7,ramp,0.1,1,8,0.1,0.2,1,8,,,45,600,0.75,0.74,0";
         let read = |line: &str| read_csv(format!("{HEADER}\n{good}\n{line}\n").as_bytes());
         assert_eq!(read(good).unwrap().steps(), 2);
         for (line, column) in [
             ("1,7,ramp", "row"),
-            ("x,7,ramp,0.1,1,8,0.1,0.2,1,8,,,45,600,0", "scenario"),
-            ("1,7,ramp,0.1,nan,8,0.1,0.2,1,8,,,45,600,0", "code_m"),
-            ("1,7,ramp,0.1,1,8,,0.2,1,8,,,45,600,0", "rate_mps"),
-            ("1,7,ramp,0.1,1,8,0.1,0.2,1,8,,,45,600,2", "label"),
+            (
+                "x,7,ramp,0.1,1,8,0.1,0.2,1,8,,,45,600,0.75,0.74,0",
+                "scenario",
+            ),
+            (
+                "1,7,ramp,0.1,nan,8,0.1,0.2,1,8,,,45,600,0.75,0.74,0",
+                "code_m",
+            ),
+            ("1,7,ramp,0.1,1,8,,0.2,1,8,,,45,600,0.75,0.74,0", "rate_mps"),
+            ("1,7,ramp,0.1,1,8,0.1,0.2,1,8,,,45,600,,,2", "label"),
+            (
+                "1,7,ramp,0.1,1,8,0.1,0.2,1,8,,,45,600,0.75,,0",
+                "late_ratio",
+            ),
         ] {
             let message = read(line).unwrap_err().to_string();
             assert!(
