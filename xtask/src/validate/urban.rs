@@ -91,7 +91,7 @@ fn p95(values: impl Iterator<Item = f64>) -> f64 {
     all.get(all.len() * 95 / 100).copied().unwrap_or(f64::NAN)
 }
 
-/// Errors stand-alone and assisted, in the order of [`ALL`].
+/// Errors stand-alone and assisted, in the order of `ALL`.
 #[derive(Debug, Clone)]
 pub struct Table {
     seeds: usize,
