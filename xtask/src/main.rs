@@ -153,8 +153,9 @@ enum Validation {
         /// Folder of the models
         #[arg(long, value_name = "DIR", default_value = "assets/models")]
         models: PathBuf,
-        /// Healthy channel-hours that false alarms are counted in; thresholds are found in 0.3 times as many others
-        #[arg(long, value_name = "H", default_value_t = 1100.0)]
+        /// Healthy channel-hours that false alarms are counted in, reckoned with nine channels a run, of which about seven
+        /// come; thresholds are found in 0.3 times as many others
+        #[arg(long, value_name = "H", default_value_t = 1400.0)]
         hours: f64,
         /// Scenarios with faults
         #[arg(long, value_name = "N", default_value_t = 400, value_parser = clap::value_parser!(u32).range(40..))]
