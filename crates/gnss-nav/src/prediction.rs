@@ -10,6 +10,8 @@ use crate::{Ephemeris, GpsTime, NavError, SatelliteState};
 
 /// Period of the C/A code, s.
 const CA_PERIOD_S: f64 = 1e-3;
+/// C/A code periods in a data bit.
+const PERIODS_PER_BIT: i64 = 20;
 
 /// Time a signal takes from most satellites, s.
 const TYPICAL_TRAVEL_S: f64 = 0.075;
@@ -54,6 +56,15 @@ impl Expected {
         let chips = self.transmit_time.fraction_s() % CA_PERIOD_S * CA_CODE_RATE_HZ;
         // The remainder is below one period; times the rate it may round up to all of it.
         chips.min((CA_PERIOD_S * CA_CODE_RATE_HZ).next_down())
+    }
+
+    /// Code periods of L1 C/A that are over in the data bit that arrives, below 20.
+    #[must_use]
+    pub fn periods_into_bit(&self) -> u8 {
+        let fraction_s = self.transmit_time.fraction_s();
+        // From where the code period began, so that both change together.
+        let began_s = fraction_s - fraction_s % CA_PERIOD_S;
+        ((began_s / CA_PERIOD_S).round() as i64).rem_euclid(PERIODS_PER_BIT) as u8
     }
 
     /// Rate at which the code phase grows, chips/s: 1.023e6 (1 - range rate / c), equation (4) of
@@ -221,6 +232,8 @@ mod tests {
             let periods = one.transmit_time.fraction_s() * 1e3 - chips / 1023.0;
             // 1e3 periods of a second round to 1e-13.
             assert!((periods - periods.round()).abs() < 1e-9, "{periods}");
+            let into_bit = f64::from(one.periods_into_bit());
+            assert_eq!(periods.round().rem_euclid(20.0), into_bit);
         }
     }
 

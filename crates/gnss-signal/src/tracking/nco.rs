@@ -78,17 +78,32 @@ impl Nco {
             (self.carrier_phase_cycles + frequency_hz * elapsed_s).rem_euclid(1.0);
     }
 
+    /// Code phase that navigation wants here, chips; it goes on where a period ends.
+    fn wanted_chips(&self, steering: &Steering) -> f64 {
+        let since_s = (self.tick as f64 - steering.tick as f64) / self.front_end.sample_rate_hz;
+        steering.code_phase_chips + steering.code_rate_hz * since_s
+    }
+
     /// Puts the code where navigation says, at its rate whatever the Doppler is; returns the shift, chips.
     pub(super) fn steer_code(&mut self, steering: &Steering) -> f64 {
         self.code_slip_hz = 0.0;
         self.code_slip_hz = steering.code_rate_hz - self.code_rate_hz();
-        let since_s = (self.tick as f64 - steering.tick as f64) / self.front_end.sample_rate_hz;
-        let wanted = steering.code_phase_chips + steering.code_rate_hz * since_s;
+        let wanted = self.wanted_chips(steering);
         let half = self.code_length_chips() / 2.0;
         let error = wanted - self.code_phase_chips;
         let shift = (error + half).rem_euclid(2.0 * half) - half;
         self.shift_code(shift);
         shift
+    }
+
+    /// The code period, below those of a bit, with which bits begin where `steering` says so, once the code is
+    /// there.
+    pub(super) fn first_period_of_bit(&self, steering: &Steering) -> Option<i64> {
+        let ahead = self.wanted_chips(steering) - self.code_phase_chips;
+        let since = (ahead / self.code_length_chips()).round() as i64;
+        let over = i64::from(steering.periods_into_bit?) + since;
+        let bit_periods = i64::from(self.signal.spec().code_periods_per_bit);
+        Some((self.code_period - over).rem_euclid(bit_periods))
     }
 
     /// Adds to the code phase; a whole code length is a code period.

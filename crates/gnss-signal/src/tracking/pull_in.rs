@@ -19,6 +19,13 @@ const STEP_HZ: f64 = 5.0;
 /// Log likelihood ratio of the best bit boundary to the second best that is believed: one wrong
 /// in 20 000.
 const BIT_EDGE_CONFIDENCE: f64 = 10.0;
+/// ... which is also that of so many periods of signal over noise: a change of sign taken one period off
+/// costs four. Of a strong signal less than two changes is what an oscillator's phase noise makes of bits
+/// that are all alike.
+const BIT_EDGE_PERIODS: f64 = 6.0;
+
+/// Whole bits that a drift of the code is found from: in an inverted spectrum it goes at up to 6 chips/s.
+const DRIFT_BITS: usize = 3;
 
 /// The one-period sums of a stretch, and the noise variance of each.
 #[derive(Debug, Clone, Default)]
@@ -34,11 +41,11 @@ pub(super) struct PullInEstimate {
     pub(super) doppler_offset_hz: f64,
     /// Code phase of the signal over that of the replica in the middle of the stretch, chips.
     pub(super) code_offset_chips: f64,
-    /// How much that grew from the first half of the whole bits to the second, chips; 0 with
+    /// How much that grew from the first half of the first whole bits to the second, chips; 0 with
     /// fewer than two.
     pub(super) code_drift_chips: f64,
-    /// Whole bits in the stretch.
-    pub(super) whole_bits: usize,
+    /// How many whole bits those are.
+    pub(super) drift_bits: usize,
     /// First period that begins a bit, where it is certain.
     pub(super) bit_edge: Option<u32>,
     /// Phase of the signal over that of the replica in the middle of the first period, cycles
@@ -86,7 +93,7 @@ impl Stretch {
             doppler_offset_hz: offset_hz,
             code_offset_chips: code_error_chips(&blocks.used, self.noise, spacing_chips),
             code_drift_chips: blocks.code_drift_chips(self.noise, spacing_chips),
-            whole_bits: blocks.whole.len(),
+            drift_bits: blocks.first_whole().len(),
             bit_edge: certain.then_some(edge as u32),
             phase_offset_cycles: blocks.phase_cycles(),
             cn0_hz,
@@ -113,7 +120,8 @@ impl Stretch {
         let (edge, best) = largest(best_edges.iter().copied())?;
         let others = best_edges.iter().enumerate().filter(|(k, _)| *k != edge);
         let second = others.map(|(_, v)| *v).fold(f64::NEG_INFINITY, f64::max);
-        let certain = best - second > BIT_EDGE_CONFIDENCE;
+        let needed = BIT_EDGE_CONFIDENCE.max(BIT_EDGE_PERIODS * signal / self.noise);
+        let certain = best - second > needed;
         Some((interpolated_peak(&by_offset)?, (edge, certain)))
     }
 
@@ -250,9 +258,15 @@ impl Blocks {
         (power > 0.0).then(|| power / weight)
     }
 
-    /// Growth of the code error from the first half of the whole bits to the second, chips.
+    /// The whole bits in which a code that slips is still on the flanks of the taps.
+    fn first_whole(&self) -> &[EarlyPromptLate] {
+        &self.whole[..self.whole.len().min(DRIFT_BITS)]
+    }
+
+    /// Growth of the code error from the first half of the first whole bits to the second, chips.
     fn code_drift_chips(&self, noise: f64, spacing_chips: f64) -> f64 {
-        let whole: Vec<_> = self.whole.iter().map(|b| (*b, BIT as f64)).collect();
+        let first = self.first_whole().iter();
+        let whole: Vec<_> = first.map(|b| (*b, BIT as f64)).collect();
         let (first, second) = whole.split_at(whole.len() / 2);
         if first.is_empty() {
             return 0.0;
@@ -326,6 +340,28 @@ mod tests {
                 assert!((found.code_offset_chips - 0.1).abs() < 0.04);
                 // Prompt lies 0.1 chip off the peak, 0.9 dB.
                 assert!((10.0 * found.cn0_hz.log10() + 0.9 - cn0).abs() < 1.0);
+            }
+        }
+    }
+
+    #[test]
+    fn bits_that_are_all_alike_have_no_certain_edge_whatever_the_oscillator_does() {
+        // White frequency noise of h0 = 1.2e-19 s walks 0.34 rad in a bit.
+        let step_rad = 0.34 / (BIT as f64).sqrt();
+        for (cn0, seed) in [(43.0, 0), (50.0, 100)] {
+            for seed in seed..seed + 50 {
+                let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+                let mut alike = Stretch::default();
+                let mut phase_rad = 0.0;
+                for sums in stretch(cn0, 12.0, 0, 500, seed).sums {
+                    let sign = sums.prompt * Complex64::cis(-TAU * (0.1 + 12e-3 * alike.len() as f64));
+                    let walk: f64 = StandardNormal.sample(&mut rng);
+                    phase_rad += step_rad * walk;
+                    let turn = Complex64::from_polar(sign.re.signum(), phase_rad);
+                    alike.push(sums.turned(turn.conj()), 1.0);
+                }
+                let found = alike.estimate(1e-3, 0.5).unwrap();
+                assert_eq!(found.bit_edge, None, "{cn0} dB-Hz, seed {seed}");
             }
         }
     }

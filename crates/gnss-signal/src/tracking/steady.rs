@@ -120,19 +120,11 @@ impl Steady {
         }
     }
 
-    /// Tracking of a signal that navigation predicts, `periods_into_bit` code periods after the
-    /// beginning of a bit.
-    pub(super) fn predicted(
-        mut nco: Nco,
-        settings: TrackingSettings,
-        periods_into_bit: u8,
-    ) -> Self {
-        let bit_periods = bit_periods(&nco);
-        let bit_edge = nco.code_period - i64::from(periods_into_bit);
-        // Periods are counted from a bit's beginning, and never below zero.
-        nco.code_period += bit_periods;
+    /// Tracking of a signal that navigation predicts, to be steered from here on.
+    pub(super) fn predicted(mut nco: Nco, settings: TrackingSettings) -> Self {
+        // Periods are never counted below zero.
+        nco.code_period += bit_periods(&nco);
         Self {
-            bit_edge: bit_edge.rem_euclid(bit_periods),
             helm: Helm::Navigation(Box::new(Steered::new(Presence::absent()))),
             lock: Lock::Lost,
             ..Self::new(nco, settings, 0.0, 1.0)
@@ -172,6 +164,7 @@ impl Steady {
             self.detector.unlock();
         }
         let shift = self.nco.steer_code(steering);
+        self.steer_bits(steering);
         if let Helm::Own(_) = self.helm {
             let presence = Presence::known(self.cn0_hz);
             self.helm = Helm::Navigation(Box::new(Steered::new(presence)));
@@ -179,6 +172,20 @@ impl Steady {
         }
         if let Helm::Navigation(steered) = &mut self.helm {
             steered.shifted(shift);
+        }
+    }
+
+    /// Takes bits to begin where navigation says.
+    fn steer_bits(&mut self, steering: &Steering) {
+        let Some(first) = self.nco.first_period_of_bit(steering) else {
+            return;
+        };
+        if first != self.bit_edge {
+            self.bit_edge = first;
+            self.bit = Bit::default();
+            if let Helm::Navigation(steered) = &mut self.helm {
+                steered.forget_bits();
+            }
         }
     }
 

@@ -411,10 +411,11 @@ impl Navigator {
                 Some((difference / bit_s - (difference / bit_s).round()) * bit_s)
             })
             .collect();
-        let n = offsets.len() as f64;
-        let mean = offsets.iter().sum::<f64>() / n;
-        let spread = offsets.iter().map(|o| (o - mean).abs()).fold(0.0, f64::max);
-        if n >= 4.0 && spread < BIT_AGREEMENT_S && mean.abs() < 4.0 * BIT_SAFE_SIGMA_S {
+        // A channel may have its bits wrong: three quarters have to agree.
+        let agreed = largest_agreement(&offsets);
+        let enough = agreed.len() >= NEEDED && 4 * agreed.len() >= 3 * offsets.len();
+        let mean = agreed.iter().sum::<f64>() / agreed.len() as f64;
+        if enough && mean.abs() < 4.0 * BIT_SAFE_SIGMA_S {
             clock.time = clock.time + mean;
             clock.trust = ClockTrust::Fix;
             self.clock = Some(clock);
@@ -464,6 +465,16 @@ impl Navigator {
             Some(whole + (milliseconds.round() * 1e-3 + fraction))
         })
     }
+}
+
+/// Most of `offsets_s` that agree with one of them to [`BIT_AGREEMENT_S`].
+fn largest_agreement(offsets_s: &[f64]) -> Vec<f64> {
+    let agreeing = |with: &f64| -> Vec<f64> {
+        let near = |o: &&f64| (*o - with).abs() < BIT_AGREEMENT_S;
+        offsets_s.iter().filter(near).copied().collect()
+    };
+    let all = offsets_s.iter().map(agreeing);
+    all.max_by_key(Vec::len).unwrap_or_default()
 }
 
 fn code_variance_m2(epoch: &ChannelEpoch) -> f64 {

@@ -9,7 +9,7 @@ use gnss_signal::tracking::{
 use gnss_signal::{AcquisitionHit, FrontEnd, Replica, Signal, SignalId, Taps};
 
 use super::shape::ShapeWatch;
-use super::vector::steering;
+use super::vector::{Time, steering};
 
 /// One satellite being received.
 #[derive(Debug, Clone)]
@@ -77,9 +77,7 @@ impl Slot {
         tick: u64,
         expected: &Expected,
     ) -> Self {
-        let steering = steering(tick, expected);
-        let bit_periods = i64::from(signal.spec().code_periods_per_bit);
-        let periods = (expected.transmit_time.fraction_s() / signal.spec().code_period_s()) as i64;
+        let steering = steering(tick, expected, Time::Exact);
         let hit = AcquisitionHit {
             signal,
             tick,
@@ -90,13 +88,7 @@ impl Slot {
             cn0_dbhz: 0.0,
         };
         Self {
-            channel: Channel::predicted(
-                signal,
-                front_end,
-                tracking,
-                &steering,
-                periods.rem_euclid(bit_periods) as u8,
-            ),
+            channel: Channel::predicted(signal, front_end, tracking, &steering),
             lock_reported: Lock::Lost,
             predicted: true,
             bits_found: true,

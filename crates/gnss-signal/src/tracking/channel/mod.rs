@@ -91,16 +91,14 @@ impl Channel {
         }
     }
 
-    /// A channel on a signal that navigation predicts, steered by it: no acquisition, no pull-in.
-    ///
-    /// `periods_into_bit` code periods of a data bit are over at the steering's tick.
+    /// A channel on a signal that navigation predicts, steered by it: no acquisition, no pull-in. Where steering
+    /// does not say otherwise a data bit begins with the code period.
     #[must_use]
     pub fn predicted(
         signal: SignalId,
         front_end: FrontEnd,
         settings: TrackingSettings,
         steering: &Steering,
-        periods_into_bit: u8,
     ) -> Self {
         let nco = Nco {
             signal,
@@ -114,7 +112,7 @@ impl Channel {
             doppler_hz: settings.spectrum.sign() * steering.doppler_hz,
             code_slip_hz: 0.0,
         };
-        let mut steady = Steady::predicted(nco, settings, periods_into_bit);
+        let mut steady = Steady::predicted(nco, settings);
         steady.steer(steering);
         Self {
             settings,

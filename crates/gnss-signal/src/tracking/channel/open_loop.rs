@@ -228,10 +228,10 @@ impl PullIn {
         }
         let spec = self.start.signal.spec();
         let bit_s = f64::from(spec.code_periods_per_bit) * self.period_s();
-        let first_bits = found.whole_bits / 2;
-        let second_bits = found.whole_bits - first_bits;
-        // The halves' middles lie half the whole bits apart.
-        let apart_s = found.whole_bits as f64 * bit_s / 2.0;
+        let first_bits = found.drift_bits / 2;
+        let second_bits = found.drift_bits - first_bits;
+        // The halves' middles lie half of those bits apart.
+        let apart_s = found.drift_bits as f64 * bit_s / 2.0;
         let variance =
             |bits: usize| code_variance_chips2(found.cn0_hz, bits as f64 * bit_s, spacing_chips);
         let fitted_hz = self.start.spectrum.sign() * found.doppler_offset_hz;

@@ -29,6 +29,8 @@ pub struct Steering {
     pub tick: u64,
     /// Code phase, chips, in [0, code length).
     pub code_phase_chips: f64,
+    /// Code periods of a data bit that are over; `None` where that is not known.
+    pub periods_into_bit: Option<u8>,
     /// Code rate, chips/s.
     pub code_rate_hz: f64,
     /// Doppler, Hz; above zero when approaching (whichever way the spectrum runs).
@@ -254,6 +256,12 @@ impl Steered {
     /// The code oscillator was shifted.
     pub(super) fn shifted(&mut self, chips: f64) {
         self.shifted_chips += chips;
+    }
+
+    /// Bits begin elsewhere from here on.
+    pub(super) fn forget_bits(&mut self) {
+        self.interval = Interval::default();
+        self.alignment = Alignment::default();
     }
 
     /// Takes an integration; returns what its interval measured where it is complete.

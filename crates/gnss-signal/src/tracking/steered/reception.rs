@@ -9,6 +9,8 @@ use crate::tracking::discriminator::{CodeDiscriminator, EarlyPromptLate, Frequen
 /// Ratio of signal to noise of an interval below which its own power does not normalise errors:
 /// it would be mostly noise.
 const WEAK_SNR: f64 = 4.0;
+/// Less of its power than this is found of a signal whose carrier slips by half a cycle while it is summed.
+const LEAST_FOUND: f64 = 0.25;
 /// No signal further away than this reaches the early or late tap, chips.
 const LARGEST_CHIPS: f64 = 1.5;
 /// C/N0 below which signals are not told apart, Hz (8 dB-Hz): its estimate is noise.
@@ -52,7 +54,8 @@ impl Reception {
     }
 
     /// Code error of coherent sums over `sums_s`, chips, that have `noise_variance` without a signal: the
-    /// envelope's, or, of a weak signal, the power's over the power that its C/N0 promises.
+    /// envelope's, or, of a weak signal and of one that a slip of the carrier has taken away, the power's over the
+    /// power that its C/N0 promises.
     #[must_use]
     pub fn code_error_chips(
         &self,
@@ -61,7 +64,8 @@ impl Reception {
         sums_s: f64,
     ) -> f64 {
         let snr = self.snr(sums_s);
-        if snr > WEAK_SNR {
+        let found = taps.prompt.norm_sqr() / noise_variance - 1.0;
+        if snr > WEAK_SNR && found > LEAST_FOUND * snr {
             return CodeDiscriminator::Envelope.error_chips(taps, self.spacing_chips);
         }
         let peak = 1.0 - self.spacing_chips / 2.0;

@@ -51,8 +51,7 @@ impl Run {
             ..TrackingSettings::default()
         };
         let start = steering(&signal, 0, 0.0, 0.0);
-        // Code phase 5000.3 chips from the start of a bit at tick 0.
-        let channel = Channel::predicted(signal.signal, signal.front_end, settings, &start, 4);
+        let channel = Channel::predicted(signal.signal, signal.front_end, settings, &start);
         let unused = SignalId::gps_l1_ca(37).unwrap();
         Self {
             noise: NoiseFloor::new(unused, signal.front_end).unwrap(),
@@ -104,9 +103,11 @@ impl Run {
 fn steering(signal: &IdealSignal, tick: u64, code_error: f64, doppler_error: f64) -> Steering {
     let t = tick as f64 / signal.front_end.sample_rate_hz;
     let doppler_hz = signal.doppler_hz + signal.doppler_rate_hz_s * t + doppler_error;
+    let chips = signal.chips_at(t) + code_error;
     Steering {
         tick,
-        code_phase_chips: (signal.chips_at(t) + code_error).rem_euclid(1023.0),
+        code_phase_chips: chips.rem_euclid(1023.0),
+        periods_into_bit: Some((chips / 1023.0).floor().rem_euclid(20.0) as u8),
         code_rate_hz: 1.023e6 * (1.0 + doppler_hz / 1575.42e6),
         doppler_hz,
     }
@@ -218,4 +219,27 @@ fn bits_are_found_while_navigation_steers() {
     run.channel.release(0.01);
     assert_eq!(period(&mut run, 3.0), expected(&run, 3.0));
     assert_eq!(run.channel.lock(), Lock::Carrier);
+}
+
+#[test]
+fn bits_begin_where_navigation_says_and_there_they_stay() {
+    let mut run = Run::new(45.0, 3, SteeredSettings::default());
+    let rate_hz = run.signal.front_end.sample_rate_hz;
+    // What is said at each tenth of a second, against the truth, and what then holds.
+    let said = [(Some(3), 3), (None, 3), (Some(0), 0), (None, 0), (Some(19), 19)];
+    for (k, (off, holds)) in said.into_iter().enumerate() {
+        let tick = |tenths: f64| (tenths * 0.1 * rate_hz) as u64;
+        run.track(tick(k as f64));
+        let right = steering(&run.signal, tick(k as f64), 0.0, 0.0);
+        let wrong = |off: u8| Some((right.periods_into_bit? + off) % 20);
+        assert!(run.channel.steer(&Steering {
+            periods_into_bit: off.and_then(wrong),
+            ..right
+        }));
+        let end = tick(k as f64 + 0.99);
+        run.track(end);
+        let true_periods = steering(&run.signal, end, 0.0, 0.0).periods_into_bit.unwrap();
+        let epoch = run.channel.epoch(end).unwrap();
+        assert_eq!(epoch.periods_into_bit, Some((true_periods + holds) % 20));
+    }
 }

@@ -321,7 +321,7 @@ impl VectorTracking {
             &expected,
             &self.settings,
         );
-        let raw = raw.map(|raw| self.carried(raw, epoch.doppler_age_s, &expected));
+        let raw = raw.map(|raw| self.scattered(self.carried(raw, epoch.doppler_age_s, &expected)));
         Some(Member {
             satellite,
             epoch,
@@ -341,6 +341,18 @@ impl VectorTracking {
         let change_mps = -path.normalize().dot(&self.acceleration_mps2) * age_s;
         RawMeasurement {
             range_rate_mps: raw.range_rate_mps + change_mps,
+            ..raw
+        }
+    }
+
+    /// `raw` with the variance that range rates have in excess of the stated one.
+    fn scattered(&self, raw: RawMeasurement) -> RawMeasurement {
+        let excess = match self.settings.noise {
+            MeasurementNoise::Measured => self.scatter.rate_variance_m2_s2(),
+            MeasurementNoise::Fixed { .. } => 0.0,
+        };
+        RawMeasurement {
+            range_rate_variance_m2: raw.range_rate_variance_m2 + excess,
             ..raw
         }
     }

@@ -2,10 +2,12 @@
 //!
 //! Range rates of different satellites do not hold over quite the same time: each follows the bits of its own
 //! satellite. White noise of the clock's frequency is therefore not quite common to all, and of an oscillator with much
-//! of it, or of one that is shaken, healthy channels deviate from each other by several stated deviations. What most
-//! channels do is no channel's fault.
+//! of it, or of one that is shaken, healthy channels deviate from each other by several stated deviations. A filter that
+//! takes such rates for as good as their carriers is led astray by those of a few satellites. What most channels do is no
+//! channel's fault: it is added to the variance of every range rate. Of pseudoranges the monitors alone are told, in
+//! proportion.
 
-use gnss_nav::filter::GivenOthers;
+use gnss_nav::filter::{Deviation, GivenOthers};
 
 /// Time over which it is found, s.
 const MEMORY_S: f64 = 2.0;
@@ -14,46 +16,76 @@ const FEWEST: usize = 5;
 /// Mean square of normal numbers of deviation one without the largest quarter.
 const MEAN_SQUARE: f64 = 0.3685;
 
-/// Found variance over stated variance, of pseudoranges and of range rates; never below one.
+/// What was found so far.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Scatter {
     code: Ratio,
-    rate: Ratio,
+    rate: Excess,
 }
 
 impl Scatter {
     /// Nothing was seen yet.
     pub(super) const fn new() -> Self {
         Self {
-            code: Ratio::NEW,
-            rate: Ratio::NEW,
+            code: Ratio {
+                mean: 1.0,
+                seen_s: 0.0,
+            },
+            rate: Excess {
+                variance: 0.0,
+                seen_s: 0.0,
+            },
         }
     }
 
-    /// Takes the deviations of an epoch, `interval_s` after the last one, each given all others of them.
+    /// Takes the deviations of an epoch, `interval_s` after the last one, each given all others of them; variances of
+    /// range rates hold [`Self::rate_variance_m2_s2`] already.
     pub(super) fn follow<'a>(
         &mut self,
         given: impl Iterator<Item = &'a GivenOthers> + Clone,
         interval_s: f64,
     ) {
-        let code = given.clone().map(|g| g.code.normalised_squared());
-        self.code.follow(code.collect(), interval_s);
-        let rate = given.filter_map(|g| Some(g.rate?.normalised_squared()));
-        self.rate.follow(rate.collect(), interval_s);
+        let code = given.clone().map(|g| g.code);
+        self.code.follow(&without_largest(code), interval_s);
+        let rate = given.filter_map(|g| g.rate);
+        self.rate.follow(&without_largest(rate), interval_s);
     }
 
-    /// `given` with the variances that were found.
+    /// Variance of every range rate over the stated one, (m/s)^2.
+    pub(super) const fn rate_variance_m2_s2(&self) -> f64 {
+        self.rate.variance
+    }
+
+    /// `given` with the variance of pseudoranges that was found.
     pub(super) fn widened(&self, given: &GivenOthers) -> GivenOthers {
         let mut wide = *given;
-        wide.code.variance *= self.code.value();
-        if let Some(rate) = &mut wide.rate {
-            rate.variance *= self.rate.value();
-        }
+        wide.code.variance *= self.code.mean.max(1.0);
         wide
     }
 }
 
-/// A running mean of mean squares without the largest quarter, whose channels may be faulty.
+/// Deviations without the largest quarter, whose channels may be faulty; none where they are too few.
+fn without_largest(deviations: impl Iterator<Item = Deviation>) -> Vec<Deviation> {
+    let mut all: Vec<Deviation> = deviations.collect();
+    if all.len() < FEWEST {
+        return Vec::new();
+    }
+    all.sort_unstable_by(|a, b| a.normalised_squared().total_cmp(&b.normalised_squared()));
+    all.truncate(all.len() - all.len().div_ceil(4));
+    all
+}
+
+/// Mean of `values` over deviations.
+fn mean(deviations: &[Deviation], values: impl Fn(&Deviation) -> f64) -> f64 {
+    deviations.iter().map(values).sum::<f64>() / deviations.len() as f64
+}
+
+/// Found variance over stated variance of most.
+fn found_over_stated(most: &[Deviation]) -> f64 {
+    mean(most, Deviation::normalised_squared) / MEAN_SQUARE
+}
+
+/// A running mean of found over stated variance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Ratio {
     mean: f64,
@@ -61,24 +93,31 @@ struct Ratio {
 }
 
 impl Ratio {
-    const NEW: Self = Self {
-        mean: 1.0,
-        seen_s: 0.0,
-    };
-
-    const fn value(&self) -> f64 {
-        self.mean.max(1.0)
-    }
-
-    fn follow(&mut self, mut squares: Vec<f64>, interval_s: f64) {
-        if squares.len() < FEWEST {
-            return;
+    fn follow(&mut self, most: &[Deviation], interval_s: f64) {
+        if !most.is_empty() {
+            self.seen_s = (self.seen_s + interval_s).min(MEMORY_S);
+            self.mean += interval_s / self.seen_s * (found_over_stated(most) - self.mean);
         }
-        squares.sort_unstable_by(f64::total_cmp);
-        squares.truncate(squares.len() - squares.len().div_ceil(4));
-        let mean = squares.iter().sum::<f64>() / squares.len() as f64;
-        self.seen_s = (self.seen_s + interval_s).min(MEMORY_S);
-        self.mean += interval_s / self.seen_s * (mean / MEAN_SQUARE - self.mean);
+    }
+}
+
+/// The variance that most have in excess of what is stated of each; never below zero.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Excess {
+    variance: f64,
+    seen_s: f64,
+}
+
+impl Excess {
+    /// A step of Newton's towards the excess with which found and stated variance are the same; what is found of the
+    /// best counts most.
+    fn follow(&mut self, most: &[Deviation], interval_s: f64) {
+        if !most.is_empty() {
+            self.seen_s = (self.seen_s + interval_s).min(MEMORY_S);
+            let typical = 1.0 / mean(most, |d| 1.0 / d.variance);
+            let step = typical * (found_over_stated(most) - 1.0);
+            self.variance = (self.variance + interval_s / self.seen_s * step).max(0.0);
+        }
     }
 }
 
@@ -92,15 +131,25 @@ mod tests {
 
     use super::*;
 
-    fn epoch(random: &mut ChaCha8Rng, satellites: u8, rate_sigmas: f64) -> Vec<GivenOthers> {
-        let mut deviation = |sigmas: f64| Deviation {
-            value: 3.0 * sigmas * random.sample::<f64, _>(StandardNormal),
-            variance: 9.0,
-        };
+    /// Deviations of satellites of which pseudoranges are stated to 3 m and half as wide, range rates stated to 0.1 m/s
+    /// and `extra_mps` more, and `scatter` is told of them.
+    fn epoch(
+        random: &mut ChaCha8Rng,
+        scatter: &Scatter,
+        satellites: u8,
+        extra_mps: f64,
+    ) -> Vec<GivenOthers> {
+        let mut normal = |sigma: f64| sigma * random.sample::<f64, _>(StandardNormal);
         let mut given = |prn| GivenOthers {
             satellite: SatelliteId::gps(prn),
-            code: deviation(0.5),
-            rate: Some(deviation(rate_sigmas)),
+            code: Deviation {
+                value: normal(1.5),
+                variance: 9.0,
+            },
+            rate: Some(Deviation {
+                value: normal(0.1) + normal(extra_mps),
+                variance: 0.01 + scatter.rate_variance_m2_s2(),
+            }),
         };
         (1..=satellites).map(&mut given).collect()
     }
@@ -110,26 +159,39 @@ mod tests {
         let mut random = ChaCha8Rng::seed_from_u64(3);
         let mut scatter = Scatter::new();
         for _ in 0..500 {
-            let mut given = epoch(&mut random, 9, 3.0);
+            let mut given = epoch(&mut random, &scatter, 9, 0.4);
             given[0].code.value = 100.0;
+            if let Some(rate) = &mut given[0].rate {
+                rate.value = 20.0;
+            }
             scatter.follow(given.iter(), 0.02);
         }
-        let given = epoch(&mut random, 9, 3.0);
+        let given = epoch(&mut random, &scatter, 9, 0.4);
         let wide = scatter.widened(&given[4]);
-        assert_eq!(
-            wide.code, given[4].code,
-            "codes that are better than stated"
-        );
-        let ratio = wide.rate.unwrap().variance / given[4].rate.unwrap().variance;
+        assert_eq!(wide, given[4], "codes that are better than stated");
         // Of nine, six are left, a tenth less than three quarters; over a hundred epochs it scatters by 7 %.
-        assert!((6.0..11.0).contains(&ratio), "{ratio}");
+        let extra_mps = scatter.rate_variance_m2_s2().sqrt();
+        assert!((0.33..0.44).contains(&extra_mps), "{extra_mps}");
+    }
+
+    #[test]
+    fn rates_as_good_as_stated_have_next_to_no_excess() {
+        let mut random = ChaCha8Rng::seed_from_u64(3);
+        let mut scatter = Scatter::new();
+        for _ in 0..500 {
+            let given = epoch(&mut random, &scatter, 9, 0.0);
+            scatter.follow(given.iter(), 0.02);
+        }
+        // A tenth of the stated variance is what chance leaves.
+        assert!(scatter.rate_variance_m2_s2() < 0.002, "{scatter:?}");
     }
 
     #[test]
     fn few_satellites_tell_nothing() {
         let mut random = ChaCha8Rng::seed_from_u64(3);
         let mut scatter = Scatter::new();
-        scatter.follow(epoch(&mut random, 4, 9.0).iter(), 0.02);
+        let given = epoch(&mut random, &scatter, 4, 2.0);
+        scatter.follow(given.iter(), 0.02);
         assert_eq!(scatter, Scatter::new());
     }
 }

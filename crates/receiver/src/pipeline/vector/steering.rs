@@ -29,7 +29,7 @@ impl VectorTracking {
                 None => self.expected(around, slot.satellite),
             };
             let Some(expected) = expected else { continue };
-            let to = steering(around.tick, &expected);
+            let to = steering(around.tick, &expected, self.time());
             match self.time() {
                 Time::Exact => slot.channel.steer(&to),
                 Time::Coarse => slot.channel.steer_early(&to),
@@ -38,10 +38,11 @@ impl VectorTracking {
     }
 }
 
-/// The oscillators of a signal that arrives as expected at `tick`.
-pub(in crate::pipeline) fn steering(tick: u64, expected: &Expected) -> Steering {
+/// The oscillators of a signal that arrives as expected at `tick`, and where time is exact its bits.
+pub(in crate::pipeline) fn steering(tick: u64, expected: &Expected, time: Time) -> Steering {
     Steering {
         tick,
+        periods_into_bit: (time == Time::Exact).then(|| expected.periods_into_bit()),
         code_phase_chips: expected.code_phase_chips(),
         code_rate_hz: expected.code_rate_hz(),
         doppler_hz: expected.doppler_hz,
