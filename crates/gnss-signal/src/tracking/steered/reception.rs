@@ -9,8 +9,10 @@ use crate::tracking::discriminator::{CodeDiscriminator, EarlyPromptLate, Frequen
 /// Ratio of signal to noise of an interval below which its own power does not normalise errors:
 /// it would be mostly noise.
 const WEAK_SNR: f64 = 4.0;
-/// Less of its power than this is found of a signal whose carrier slips by half a cycle while it is summed.
-const LEAST_FOUND: f64 = 0.25;
+/// Ratio of signal to noise of an interval from which noise alone ...
+const STRONG_SNR: f64 = 16.0;
+/// ... hardly leaves less of the power than this: the carrier slips by half a cycle while it is summed.
+const LEAST_FOUND: f64 = 0.5;
 /// No signal further away than this reaches the early or late tap, chips.
 const LARGEST_CHIPS: f64 = 1.5;
 /// C/N0 below which signals are not told apart, Hz (8 dB-Hz): its estimate is noise.
@@ -65,7 +67,8 @@ impl Reception {
     ) -> f64 {
         let snr = self.snr(sums_s);
         let found = taps.prompt.norm_sqr() / noise_variance - 1.0;
-        if snr > WEAK_SNR && found > LEAST_FOUND * snr {
+        let slipped = snr > STRONG_SNR && found < LEAST_FOUND * snr;
+        if snr > WEAK_SNR && !slipped {
             return CodeDiscriminator::Envelope.error_chips(taps, self.spacing_chips);
         }
         let peak = 1.0 - self.spacing_chips / 2.0;
