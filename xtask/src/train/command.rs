@@ -172,9 +172,8 @@ impl fmt::Display for Summary<'_> {
         writeln!(f, "evidence: {}", card.training["evidence"])?;
         writeln!(
             f,
-            "threshold {:.2} above an offset of {:.1} (log-odds) for {} false alarms a channel and hour, from {:.1} channel-hours{}",
+            "threshold {:.2} (log-odds) for {} false alarms a channel and hour, from {:.1} channel-hours{}",
             point.threshold,
-            card.evidence_offset.unwrap_or_default(),
             point.false_alarms_per_hour,
             point.channel_hours,
             if point.extrapolated {

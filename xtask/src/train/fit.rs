@@ -7,8 +7,9 @@ use anyhow::{Context, Result};
 use fault_ml::learned::lstm::LstmTraining;
 use fault_ml::learned::svm::SvmTraining;
 use fault_ml::learned::{
-    Calibration, Card, Dataset, FORMAT, FeatureSet, Features, HealthyScores, LearnedModel, Mode,
-    ModelKind, Network, OperatingPoint, Scaler, VERSION, Windows, choose, features, healthy_scaler,
+    Calibration, Card, Dataset, EvidenceRule, FORMAT, FeatureSet, Features, HealthyScores,
+    LearnedModel, Mode, ModelKind, Network, OperatingPoint, Scaler, VERSION, Windows, choose,
+    features, healthy_scaler,
 };
 use serde_json::{Value, json};
 
@@ -17,8 +18,9 @@ use super::scoring::Examinee;
 
 /// False alarms of a channel an hour that thresholds are found for.
 pub const FALSE_ALARMS_PER_HOUR: f64 = 0.01;
-/// Offsets of the evidence that are tried, log-odds.
-const OFFSETS: [f64; 5] = [0.0, 1.0, 2.0, 3.0, 4.0];
+/// Offsets of the evidence that are tried, log-odds, and the most that counts of a step.
+const OFFSETS: [f64; 4] = [0.0, 0.5, 1.0, 2.0];
+const MOST: [f64; 4] = [1.0, 2.0, 4.0, 100.0];
 /// A fault that is not found counts as found after so long, s.
 const MISSED_S: f64 = 10.0;
 /// Windows that the calibration is fitted to.
@@ -151,7 +153,7 @@ impl Recipe {
             interval_s: self.interval_s,
             decide_every: self.decide_every,
             calibration: Calibration::NONE,
-            evidence_offset: None,
+            evidence: None,
             operating_point: OperatingPoint {
                 threshold: 0.0,
                 false_alarms_per_hour: FALSE_ALARMS_PER_HOUR,
@@ -188,7 +190,14 @@ pub fn calibrated(model: LearnedModel, held_out: &Dataset) -> Result<LearnedMode
     Ok(model.with_card(card)?)
 }
 
-/// `model` with the offset of its evidence, and the threshold that belongs to it, that find the faults of `held_out`
+/// Every rule that is tried.
+fn rules() -> Vec<EvidenceRule> {
+    let with = |offset| MOST.map(|most| EvidenceRule { offset, most });
+    let all = OFFSETS.into_iter().flat_map(with);
+    all.filter(|rule| rule.most > rule.offset).collect()
+}
+
+/// `model` with the rule of its evidence, and the threshold that belongs to it, that find the faults of `held_out`
 /// soonest at `per_hour` false alarms of a channel; `quiet` gives the scores of healthy channels.
 ///
 /// # Errors
@@ -199,9 +208,10 @@ pub fn with_evidence(
     per_hour: f64,
     quiet: impl Fn(&[Examinee]) -> Result<Vec<HealthyScores>>,
 ) -> Result<LearnedModel> {
-    let candidates: Vec<LearnedModel> = OFFSETS
+    let rules = rules();
+    let candidates: Vec<LearnedModel> = rules
         .iter()
-        .map(|offset| unbounded(&model, Some(*offset)))
+        .map(|rule| unbounded(&model, Some(*rule)))
         .collect::<Result<_>>()?;
     let examinees: Vec<Examinee> = candidates
         .into_iter()
@@ -210,34 +220,32 @@ pub fn with_evidence(
     let quiet = quiet(&examinees)?;
     let mut best: Option<(f64, Card)> = None;
     let mut tried = Vec::new();
-    for ((offset, examinee), healthy) in OFFSETS.iter().zip(&examinees).zip(&quiet) {
+    for ((rule, examinee), healthy) in rules.iter().zip(&examinees).zip(&quiet) {
         let point = healthy.operating_point(per_hour)?;
         let faults = on_faults(held_out, &examinee.all_scores(held_out)?, point.threshold);
         let delay_s = mean_delay_s(&faults);
-        tried.push(
-            json!({ "offset": offset, "threshold": point.threshold, "mean_delay_s": delay_s }),
-        );
+        tried.push(json!({ "rule": rule, "threshold": point.threshold, "mean_delay_s": delay_s }));
         if best.as_ref().is_none_or(|(least, _)| delay_s < *least) {
             let card = Card {
-                evidence_offset: Some(*offset),
+                evidence: Some(*rule),
                 operating_point: point,
                 ..model.card().clone()
             };
             best = Some((delay_s, card));
         }
     }
-    let (_, mut card) = best.context("no offset of the evidence")?;
+    let (_, mut card) = best.context("no rule of the evidence")?;
     card.training["evidence"] = json!({ "tried": tried, "never_found_counts_s": MISSED_S });
     Ok(model.with_card(card)?)
 }
 
-/// `model` with that offset of its evidence, and no end to it.
+/// `model` with that rule of its evidence, and no end to it.
 ///
 /// # Errors
 /// None in practice.
-pub fn unbounded(model: &LearnedModel, offset: Option<f64>) -> Result<LearnedModel> {
+pub fn unbounded(model: &LearnedModel, rule: Option<EvidenceRule>) -> Result<LearnedModel> {
     let mut card = model.card().clone();
-    card.evidence_offset = offset;
+    card.evidence = rule;
     card.operating_point.threshold = f64::MAX / 4.0;
     Ok(model.clone().with_card(card)?)
 }

@@ -289,7 +289,7 @@ pub fn fit(kind: ModelKind, length: usize, split: &Split, seed: u64) -> Result<L
         interval_s: INTERVAL_S,
         decide_every: 1,
         calibration: Calibration::NONE,
-        evidence_offset: None,
+        evidence: None,
         operating_point: OperatingPoint {
             threshold: 0.0,
             false_alarms_per_hour: 1.0,

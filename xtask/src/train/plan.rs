@@ -72,13 +72,13 @@ impl Series {
     };
     /// What thresholds are found and false alarms counted by.
     pub const HEALTHY: Self = Self {
-        seed: 3,
-        week: 2441,
+        seed: 8,
+        week: 2499,
     };
     /// What is judged by.
     pub const TEST: Self = Self {
-        seed: 5,
-        week: 2475,
+        seed: 7,
+        week: 2491,
     };
     /// What models are tested on that have not learned from all there is.
     pub const GENERALISATION: Self = Self {

@@ -5,12 +5,12 @@ use serde_json::Value;
 
 use super::calibration::Calibration;
 use super::operating_point::OperatingPoint;
-use super::{Evidence, FeatureSet, LearnedError};
+use super::{Evidence, EvidenceRule, FeatureSet, LearnedError};
 
 /// What a card says it is.
 pub const FORMAT: &str = "channel-monitor";
 /// Version of the format that this program writes and reads.
-pub const VERSION: u64 = 3;
+pub const VERSION: u64 = 4;
 
 /// Which kind of model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -65,9 +65,8 @@ pub struct Card {
     pub decide_every: usize,
     /// From its raw score to log-odds.
     pub calibration: Calibration,
-    /// Log-odds beyond which those of a step are evidence that gathers over steps; absent: every step is judged by
-    /// its own.
-    pub evidence_offset: Option<f64>,
+    /// What of the log-odds of a step is evidence that gathers over steps; absent: every step is judged by its own.
+    pub evidence: Option<EvidenceRule>,
     /// Where it alarms.
     pub operating_point: OperatingPoint,
     /// Check sum of the weights (FNV-1a, 64 bits, hexadecimal).
@@ -121,11 +120,9 @@ impl Card {
         if self.kind == ModelKind::Svm && self.mode == Mode::Streaming {
             return refuse("mode: a support-vector machine has no state to carry");
         }
-        if self
-            .evidence_offset
-            .is_some_and(|offset| !offset.is_finite())
-        {
-            return refuse("evidence_offset: expected a number");
+        let gathers = |rule: EvidenceRule| rule.offset.is_finite() && rule.most > rule.offset;
+        if !self.evidence.is_none_or(gathers) {
+            return refuse("evidence: expected an offset below the most that counts");
         }
         if !self.operating_point.threshold.is_finite() {
             return refuse("threshold: expected a number");
@@ -135,10 +132,9 @@ impl Card {
 
     /// What gathers over steps, where something does. Twice what an alarm takes is enough to keep.
     #[must_use]
-    pub fn evidence(&self) -> Option<Evidence> {
+    pub fn no_evidence_yet(&self) -> Option<Evidence> {
         let largest = 2.0 * self.operating_point.threshold.max(0.0);
-        let offset = self.evidence_offset?;
-        Some(Evidence::new(offset, largest))
+        Some(Evidence::new(self.evidence?, largest))
     }
 
     /// The text of the card, with a line break at its end.

@@ -33,7 +33,7 @@ pub use card::{Card, FORMAT, Mode, ModelKind, VERSION};
 pub use csv::{read_csv, write_csv};
 pub use dataset::{Dataset, Label, LabelledStep, Sequence, Split};
 pub use error::LearnedError;
-pub use evidence::Evidence;
+pub use evidence::{Evidence, EvidenceRule};
 pub use feature::{FeatureSet, FeatureTrack, Features};
 pub use history::SlidingWindow;
 pub use model::{LearnedModel, Network};

@@ -53,7 +53,7 @@ impl LearnedMonitor {
                 Memory::Window(window, state)
             }
         };
-        let evidence = card.evidence();
+        let evidence = card.no_evidence_yet();
         Self {
             track: FeatureTrack::new(card.features),
             model,

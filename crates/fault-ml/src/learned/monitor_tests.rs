@@ -23,7 +23,7 @@ fn card(kind: ModelKind, mode: Mode, window: usize) -> Card {
             slope: 2.0,
             offset: 0.5,
         },
-        evidence_offset: None,
+        evidence: None,
         operating_point: OperatingPoint {
             threshold: 1.0,
             false_alarms_per_hour: 0.01,

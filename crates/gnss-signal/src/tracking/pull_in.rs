@@ -354,7 +354,8 @@ mod tests {
                 let mut alike = Stretch::default();
                 let mut phase_rad = 0.0;
                 for sums in stretch(cn0, 12.0, 0, 500, seed).sums {
-                    let sign = sums.prompt * Complex64::cis(-TAU * (0.1 + 12e-3 * alike.len() as f64));
+                    let sign =
+                        sums.prompt * Complex64::cis(-TAU * (0.1 + 12e-3 * alike.len() as f64));
                     let walk: f64 = StandardNormal.sample(&mut rng);
                     phase_rad += step_rad * walk;
                     let turn = Complex64::from_polar(sign.re.signum(), phase_rad);

@@ -1,6 +1,6 @@
 //! What faults do to the position while a monitor decides who enters the filter.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::sync::Arc;
 
@@ -23,8 +23,10 @@ use crate::train::plan::Plan;
 const MISLEADING: f64 = 4.0;
 /// Epochs before count for nothing: the filter settles, s.
 const SETTLED_S: f64 = 10.0;
-/// Largest error and stated deviation that are drawn, m.
+/// Largest error and stated deviation that are drawn, m ...
 const DRAWN_M: f64 = 60.0;
+/// ... and how far apart dots are that do not hide each other, m.
+const DOT_M: f64 = 0.25;
 
 /// The receiver as it comes, watched by these and nobody else; what they find is excluded.
 #[derive(Debug, Clone, Default)]
@@ -232,13 +234,7 @@ pub fn stanford(consequences: &[Consequence]) -> Result<String> {
             label: label.to_owned(),
             colour,
             stroke: Stroke::Dots,
-            points: all
-                .epochs
-                .iter()
-                .filter(|e| pick(e))
-                .map(|e| (MISLEADING * e.sigma_m, e.error_m))
-                .filter(|(stated, error)| stated.max(*error) < DRAWN_M)
-                .collect(),
+            points: dots(all.epochs.iter().filter(|e| pick(e))),
         };
         Chart {
             caption: all.label.to_owned(),
@@ -255,6 +251,17 @@ pub fn stanford(consequences: &[Consequence]) -> Result<String> {
     };
     let charts: Vec<Chart> = consequences.iter().map(chart).collect();
     picture("Faults and what the receiver says of its error", &charts)
+}
+
+/// What is stated of errors and what they are, m, one dot for all that would lie on it.
+fn dots<'a>(epochs: impl Iterator<Item = &'a Epoch>) -> Vec<(f64, f64)> {
+    let points = epochs.map(|e| (MISLEADING * e.sigma_m, e.error_m));
+    let drawn = points.filter(|(stated, error)| stated.max(*error) < DRAWN_M);
+    let place = |m: f64| (m / DOT_M) as u32;
+    let places: BTreeSet<_> = drawn.map(|(x, y)| (place(x), place(y))).collect();
+    let middle = |place: u32| (f64::from(place) + 0.5) * DOT_M;
+    let dots = places.into_iter();
+    dots.map(|(x, y)| (middle(x), middle(y))).collect()
 }
 
 /// A table of `consequences`.

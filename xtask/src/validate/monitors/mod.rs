@@ -77,7 +77,7 @@ fn subjects(models: &Path) -> Result<Vec<Subject>> {
     }];
     for kind in [ModelKind::Svm, ModelKind::Lstm] {
         let model = read_model(kind, models)?;
-        let free = unbounded(&model, model.card().evidence_offset)?;
+        let free = unbounded(&model, model.card().evidence)?;
         subjects.push(Subject {
             name: kind.name(),
             examinee: Examinee::Learned(Arc::new(free)),

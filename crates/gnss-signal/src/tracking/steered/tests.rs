@@ -226,7 +226,13 @@ fn bits_begin_where_navigation_says_and_there_they_stay() {
     let mut run = Run::new(45.0, 3, SteeredSettings::default());
     let rate_hz = run.signal.front_end.sample_rate_hz;
     // What is said at each tenth of a second, against the truth, and what then holds.
-    let said = [(Some(3), 3), (None, 3), (Some(0), 0), (None, 0), (Some(19), 19)];
+    let said = [
+        (Some(3), 3),
+        (None, 3),
+        (Some(0), 0),
+        (None, 0),
+        (Some(19), 19),
+    ];
     for (k, (off, holds)) in said.into_iter().enumerate() {
         let tick = |tenths: f64| (tenths * 0.1 * rate_hz) as u64;
         run.track(tick(k as f64));
@@ -238,7 +244,9 @@ fn bits_begin_where_navigation_says_and_there_they_stay() {
         }));
         let end = tick(k as f64 + 0.99);
         run.track(end);
-        let true_periods = steering(&run.signal, end, 0.0, 0.0).periods_into_bit.unwrap();
+        let true_periods = steering(&run.signal, end, 0.0, 0.0)
+            .periods_into_bit
+            .unwrap();
         let epoch = run.channel.epoch(end).unwrap();
         assert_eq!(epoch.periods_into_bit, Some((true_periods + holds) % 20));
     }
