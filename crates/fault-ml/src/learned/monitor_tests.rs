@@ -97,13 +97,18 @@ fn files_that_are_no_models_are_refused_by_what_is_wrong() {
     );
     refused(
         &weights,
-        &with("version", json!(4)),
-        "model card: version is 4: expected 3",
+        &with("version", json!(VERSION + 1)),
+        "model card: version is 5: expected 4",
     );
     refused(
         &weights,
         &with("window", json!(0)),
         "model card: window: expected",
+    );
+    refused(
+        &weights,
+        &with("evidence", json!({"offset": 2.0, "most": 1.0})),
+        "model card: evidence: expected an offset below",
     );
     refused(
         &weights,

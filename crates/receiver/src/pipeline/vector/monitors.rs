@@ -56,8 +56,8 @@ const CONTRADICTS_SIGMAS: f64 = 6.0;
 const FEWEST_OTHERS: usize = 5;
 
 /// Every satellite's innovations given those of the others that are `believed` and do not contradict the rest:
-/// one that does would show in the deviations of all. Variances are those that `scatter`, which takes this epoch in,
-/// has found.
+/// one that does would show in the deviations of all. Variances are those that `scatter` has found; it takes in what
+/// these others deviate.
 pub(super) fn deviations(
     innovations: &Innovations,
     covariance: &Covariance,
@@ -69,8 +69,7 @@ pub(super) fn deviations(
     let mut others: Vec<SatelliteId> = all.filter(|s| believed(*s)).collect();
     let given_by = |others: &[_]| innovations.given_others(covariance, |s| others.contains(&s));
     let mut given = given_by(&others)?;
-    scatter.follow(given.iter().filter(|g| believed(g.satellite)), interval_s);
-    loop {
+    let wide = loop {
         let wide: Vec<_> = given.iter().map(|g| scatter.widened(g)).collect();
         let heard = wide.iter().filter(|g| others.contains(&g.satellite));
         let farthest = heard.max_by(|a, b| distance2(a).total_cmp(&distance2(b)));
@@ -83,9 +82,12 @@ pub(super) fn deviations(
                 others.retain(|s| *s != contradicts);
                 given = given_by(&others)?;
             }
-            _ => return Ok(wide),
+            _ => break wide,
         }
-    }
+    };
+    let most = given.iter().filter(|g| others.contains(&g.satellite));
+    scatter.follow(most, interval_s);
+    Ok(wide)
 }
 
 /// The larger of the normalised deviations, squared.
