@@ -13,6 +13,8 @@ use gnss_nav::filter::{Deviation, GivenOthers};
 const MEMORY_S: f64 = 2.0;
 /// Fewer satellites than this tell nothing of most.
 const FEWEST: usize = 5;
+/// Less excess than this part of the stated variance may be chance, of 100 epochs of a few satellites, and does no harm.
+const CHANCE: f64 = 0.5;
 /// Mean square of normal numbers of deviation one without the largest quarter.
 const MEAN_SQUARE: f64 = 0.3685;
 
@@ -32,7 +34,8 @@ impl Scatter {
                 seen_s: 0.0,
             },
             rate: Excess {
-                variance: 0.0,
+                found: 0.0,
+                counted: 0.0,
                 seen_s: 0.0,
             },
         }
@@ -53,7 +56,7 @@ impl Scatter {
 
     /// Variance of every range rate over the stated one, (m/s)^2.
     pub(super) const fn rate_variance_m2_s2(&self) -> f64 {
-        self.rate.variance
+        self.rate.counted
     }
 
     /// `given` with the variance of pseudoranges that was found.
@@ -101,22 +104,27 @@ impl Ratio {
     }
 }
 
-/// The variance that most have in excess of what is stated of each; never below zero.
+/// The variance that most have in excess of what is stated of each.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Excess {
-    variance: f64,
+    /// A running mean; below zero where they are better than stated.
+    found: f64,
+    /// What of it is more than chance, and contained in the variances that come.
+    counted: f64,
     seen_s: f64,
 }
 
 impl Excess {
-    /// A step of Newton's towards the excess with which found and stated variance are the same; what is found of the
-    /// best counts most.
+    /// A step towards the excess with which found and stated variance are the same (Newton's); what is found of the best
+    /// counts most.
     fn follow(&mut self, most: &[Deviation], interval_s: f64) {
         if !most.is_empty() {
             self.seen_s = (self.seen_s + interval_s).min(MEMORY_S);
             let typical = 1.0 / mean(most, |d| 1.0 / d.variance);
-            let step = typical * (found_over_stated(most) - 1.0);
-            self.variance = (self.variance + interval_s / self.seen_s * step).max(0.0);
+            let now = self.counted + typical * (found_over_stated(most) - 1.0);
+            self.found += interval_s / self.seen_s * (now - self.found);
+            let by_chance = CHANCE * (typical - self.counted).max(0.0);
+            self.counted = (self.found - by_chance).max(0.0);
         }
     }
 }
@@ -182,8 +190,7 @@ mod tests {
             let given = epoch(&mut random, &scatter, 9, 0.0);
             scatter.follow(given.iter(), 0.02);
         }
-        // A tenth of the stated variance is what chance leaves.
-        assert!(scatter.rate_variance_m2_s2() < 0.002, "{scatter:?}");
+        assert_eq!(scatter.rate_variance_m2_s2(), 0.0, "{scatter:?}");
     }
 
     #[test]
