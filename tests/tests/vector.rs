@@ -238,6 +238,29 @@ fn jumps_and_gaps_of_the_samples_are_survived_and_reported() {
 }
 
 #[test]
+fn an_oscillator_with_much_white_noise_leads_no_channel_astray() {
+    // At these times of week the message has its longest runs of equal bits: nothing tells where bits begin.
+    for tow_s in [136_474, 280_456, 300_005, 300_017] {
+        let start = format!("start={{week=2441,tow_s={tow_s}.0}}");
+        let overrides = [
+            &start,
+            "duration_s=20.0",
+            "clock={preset=\"csac\"}",
+            "cn0={fixed_dbhz=48.0}",
+            "receiver={assisted=true}",
+        ];
+        let judged = run(&scenario("static-open-sky", &overrides, Some(1)));
+        assert!(judged.availability(20.0, 10.0) >= 0.99, "{tow_s}");
+        let excluded = happened(&judged, 0.0, |k| matches!(k, EventKind::Excluded { .. }));
+        assert_eq!(excluded, None, "{tow_s}");
+        assert!(
+            judged.epochs.iter().all(|e| e.horizontal_m() < 5.0),
+            "{tow_s}"
+        );
+    }
+}
+
+#[test]
 fn a_step_and_a_ramp_of_one_satellite_are_excluded() {
     for (fault, limit_s) in [
         ("{kind=\"step\",sat=\"G17\",begin_s=50,size_m=50}", 50.5),

@@ -4,6 +4,7 @@ pub mod ci;
 pub mod code_noise;
 pub mod demo;
 pub mod judged;
+pub mod order;
 pub mod reproduce;
 pub mod scenario;
 pub mod tidy;

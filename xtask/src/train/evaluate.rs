@@ -9,6 +9,7 @@ use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
 use super::scoring::Examinee;
+use crate::order::quantile;
 
 /// Windows that areas and accuracies are taken over, evenly by kind, fault and C/N0.
 const EXAMINED: usize = 20_000;
@@ -47,11 +48,7 @@ impl OnFault {
     pub fn median_delay_s(&self) -> f64 {
         let mut delays = self.delays_s.clone();
         delays.resize(self.faults, f64::INFINITY);
-        delays.sort_by(f64::total_cmp);
-        delays
-            .get(self.faults.saturating_sub(1) / 2)
-            .copied()
-            .unwrap_or(f64::INFINITY)
+        quantile(delays, 0.5)
     }
 }
 

@@ -8,6 +8,7 @@ use receiver::record::Status;
 
 use super::verdict;
 use crate::judged::{JudgedEpoch, in_parallel, receive, settings};
+use crate::order::median;
 use crate::scenario::built::Scenario;
 use crate::scenario::catalogue;
 use crate::scenario::make::Level;
@@ -93,7 +94,7 @@ struct Row {
 
 impl Row {
     fn median_dbhz(&self) -> f64 {
-        self.last_dbhz[self.last_dbhz.len() / 2]
+        median(self.last_dbhz.iter().copied())
     }
 }
 

@@ -9,6 +9,7 @@ use receiver::record::EventKind;
 
 use super::verdict;
 use crate::judged::{Judged, in_parallel, receive, settings};
+use crate::order::quantile;
 use crate::scenario::built::Scenario;
 use crate::scenario::catalogue;
 use crate::scenario::make::Level;
@@ -78,17 +79,11 @@ impl Error {
         };
         let events = runs.iter().flat_map(|run| &run.events);
         Self {
-            horizontal_m: p95(epochs().map(|e| e.horizontal_m())),
-            position_m: p95(epochs().map(|e| e.position_enu_m.norm())),
+            horizontal_m: quantile(epochs().map(|e| e.horizontal_m()), 0.95),
+            position_m: quantile(epochs().map(|e| e.position_enu_m.norm()), 0.95),
             too_few: events.filter(|e| is_too_few(&e.kind)).count(),
         }
     }
-}
-
-fn p95(values: impl Iterator<Item = f64>) -> f64 {
-    let mut all: Vec<f64> = values.collect();
-    all.sort_by(f64::total_cmp);
-    all.get(all.len() * 95 / 100).copied().unwrap_or(f64::NAN)
 }
 
 /// Errors stand-alone and assisted, in the order of `ALL`.

@@ -2,6 +2,7 @@
 
 use super::receivers::Variant;
 use super::study::{Blockage, Case, Run, Study};
+use crate::order::median;
 use crate::reproduce::Check;
 
 /// Error that the paper's receiver must exceed without detection, m.
@@ -12,20 +13,6 @@ const HELD_M: f64 = 3.0;
 pub const GOAL_M: f64 = 1.0;
 /// Longest time from the blockage to the alarm, s.
 const ALARM_S: f64 = 0.1;
-
-/// Median; the mean of the middle two where their number is even, and NaN of none.
-#[must_use]
-pub fn median(values: impl Iterator<Item = f64>) -> f64 {
-    let mut sorted: Vec<f64> = values.collect();
-    sorted.sort_by(f64::total_cmp);
-    let middle = |k: usize| sorted.get(k).copied().unwrap_or(f64::NAN);
-    let half = sorted.len() / 2;
-    if sorted.len() % 2 == 1 {
-        middle(half)
-    } else {
-        (middle(half.wrapping_sub(1)) + middle(half)) / 2.0
-    }
-}
 
 /// Largest.
 #[must_use]
@@ -91,16 +78,4 @@ fn with_exclusion(blockage: &Blockage, label: &str, runs: &[&Run]) -> [Check; 4]
         Check::at_most(name("exclusions before the blockage"), early, 0.0, ""),
         Check::at_least(name("epochs with a solution"), available, 0.99, ""),
     ]
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_median_lies_in_the_middle() {
-        assert_eq!(median([3.0, 1.0, 2.0].into_iter()), 2.0);
-        assert_eq!(median([4.0, 1.0, 2.0, 3.0].into_iter()), 2.5);
-        assert!(median(std::iter::empty()).is_nan());
-    }
 }

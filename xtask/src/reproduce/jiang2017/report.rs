@@ -4,10 +4,11 @@ use std::fmt::Write as _;
 
 use serde_json::{Value, json};
 
-use super::checks::{GOAL_M, alarm_delay_s, largest, median};
+use super::checks::{GOAL_M, alarm_delay_s, largest};
 use super::learned::WatchedRuns;
 use super::receivers::{CARRIER_HZ, CN0_DBHZ, INTERVAL_S, Variant};
 use super::study::{Blockage, Case, Run, SETTLING_S, Study};
+use crate::order::median;
 use crate::reproduce::Check;
 use crate::reproduce::report::checks_table;
 use crate::scenario::make::Level;

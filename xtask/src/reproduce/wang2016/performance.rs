@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::setting::{STEPPED, STEPS_M};
 use super::simulate::Run;
+use crate::order::{median, quantile};
 
 /// How one statistic does at one threshold; arrays are by step.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -63,8 +64,8 @@ impl Performance {
             let alarms = alarms.count() as f64;
             performance.detected[step] = alarms / runs.len() as f64;
             performance.identified[step] = if alarms > 0.0 { named / alarms } else { 0.0 };
-            performance.delay_median_s[step] = median(&delays);
-            performance.delay_p95_s[step] = quantile(&delays, 0.95);
+            performance.delay_median_s[step] = median(delays.iter().copied());
+            performance.delay_p95_s[step] = quantile(delays, 0.95);
         }
         performance
     }
@@ -72,29 +73,9 @@ impl Performance {
     /// At the threshold that `share` of the runs exceed before the onset, at most.
     #[must_use]
     pub fn at_false_alarm_share(runs: &[Run], statistic: usize, share: f64) -> Self {
-        let largest: Vec<f64> = runs.iter().map(|r| r.clean_largest[statistic]).collect();
-        Self::new(runs, statistic, quantile(&largest, 1.0 - share))
+        let largest = runs.iter().map(|r| r.clean_largest[statistic]);
+        Self::new(runs, statistic, quantile(largest, 1.0 - share))
     }
-}
-
-/// Middle value, or the mean of the two.
-#[must_use]
-pub fn median(values: &[f64]) -> f64 {
-    let sorted = sorted(values);
-    let n = sorted.len();
-    match n {
-        0 => f64::NAN,
-        _ if n % 2 == 1 => sorted[n / 2],
-        _ => 0.5 * (sorted[n / 2 - 1] + sorted[n / 2]),
-    }
-}
-
-/// Smallest value that a share `p` of `values` do not exceed.
-#[must_use]
-pub fn quantile(values: &[f64], p: f64) -> f64 {
-    let sorted = sorted(values);
-    let rank = (p * sorted.len() as f64 - 1e-9).ceil().max(1.0) as usize;
-    sorted.get(rank - 1).copied().unwrap_or(f64::NAN)
 }
 
 /// Mean.
@@ -102,12 +83,6 @@ pub fn quantile(values: &[f64], p: f64) -> f64 {
 pub fn mean(values: impl Iterator<Item = f64>) -> f64 {
     let (sum, count) = values.fold((0.0, 0.0), |(sum, n), x| (sum + x, n + 1.0));
     sum / count
-}
-
-fn sorted(values: &[f64]) -> Vec<f64> {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    sorted
 }
 
 #[cfg(test)]
@@ -150,13 +125,5 @@ mod tests {
         assert_eq!(found.identified, [2.0 / 3.0; 3]);
         let equal = Performance::at_false_alarm_share(&runs, 0, 0.25);
         assert_eq!((equal.threshold, equal.false_alarm_runs), (3.0, 0.25));
-    }
-
-    #[test]
-    fn quantiles_are_order_statistics() {
-        let values: Vec<f64> = (1..=20).map(f64::from).collect();
-        assert_eq!(quantile(&values, 0.95), 19.0);
-        assert_eq!(median(&values), 10.5);
-        assert_eq!(mean(values.into_iter()), 10.5);
     }
 }

@@ -1,8 +1,9 @@
 //! What is claimed of the results.
 
-use super::rays::{Detection, quantile};
+use super::rays::Detection;
 use super::study::Study;
 use super::urban::Way;
+use crate::order::quantile;
 use crate::reproduce::Check;
 
 /// The oracle's coefficients of Table 1 for amplitudes 0.2 to 0.9, wide band and noise-free; the paper's
@@ -48,8 +49,8 @@ fn detection(study: &Study) -> Vec<Check> {
         checks.push(Check::at_most(name(what), early(paper), 1.0, ""));
         // Line 3 of what was asked, all by one limit.
         let name = |what| name("limit of 1.7 alarms an hour, ") + what;
-        let of = |part| 1e3 * quantile(&frequent.delays_s, part);
-        let coefficient = quantile(&frequent.correlations, 0.5);
+        let of = |part| 1e3 * quantile(frequent.delays_s.iter().copied(), part);
+        let coefficient = quantile(frequent.correlations.iter().copied(), 0.5);
         checks.extend([
             Check::at_most(
                 name("runs alarmed before the onset"),

@@ -7,8 +7,8 @@ use fault_ml::shape::{ChartSettings, Shape, ShapeMonitor, ShapeSettings, closed_
 use super::channel::Channel;
 use super::closed_loop::{ClosedLoop, Reflection, Setting, settled};
 use super::correlation::Correlation;
-use super::rays::{ordered, quantile};
 use crate::judged::in_parallel;
+use crate::order::quantile;
 
 /// C/N0, dB-Hz.
 const CN0_DBHZ: f64 = 44.0;
@@ -123,9 +123,8 @@ fn first(step_s: f64, mut is_faulty: impl FnMut() -> Result<bool>) -> Result<f64
 }
 
 fn summary(delays_s: Vec<f64>) -> Delay {
-    let ordered = ordered(delays_s);
     Delay {
-        median_s: quantile(&ordered, 0.5),
-        p95_s: quantile(&ordered, 0.95),
+        median_s: quantile(delays_s.iter().copied(), 0.5),
+        p95_s: quantile(delays_s, 0.95),
     }
 }

@@ -149,30 +149,11 @@ impl Detection {
             .filter_map(|run| correlation_coefficient(&pairs(run)));
         Self {
             early_alarms: alarms.iter().filter(early).count(),
-            delays_s: ordered(
-                alarms
-                    .iter()
-                    .map(|a| a.map_or(f64::INFINITY, |s| s - ONSET_S)),
-            ),
-            correlations: ordered(correlations),
+            delays_s: alarms
+                .iter()
+                .map(|a| a.map_or(f64::INFINITY, |s| s - ONSET_S))
+                .collect(),
+            correlations: correlations.collect(),
         }
     }
-}
-
-/// `values` from the least to the largest.
-#[must_use]
-pub fn ordered(values: impl IntoIterator<Item = f64>) -> Vec<f64> {
-    let mut all: Vec<f64> = values.into_iter().collect();
-    all.sort_by(f64::total_cmp);
-    all
-}
-
-/// The value below which a `part` of `ordered` lies; NaN of none.
-#[must_use]
-pub fn quantile(ordered: &[f64], part: f64) -> f64 {
-    let place = part * ordered.len().saturating_sub(1) as f64;
-    ordered
-        .get(place.round() as usize)
-        .copied()
-        .unwrap_or(f64::NAN)
 }

@@ -7,10 +7,11 @@ use serde_json::{Value, json};
 use super::checks::COEFFICIENTS;
 use super::delays::Delay;
 use super::false_alarms::{CN0_DBHZ, FalseAlarms};
-use super::rays::{Detection, quantile};
+use super::rays::Detection;
 use super::run_lengths::RunLength;
 use super::study::Study;
 use super::urban::{SCENARIOS, Way};
+use crate::order::quantile;
 use crate::reproduce::Check;
 use crate::reproduce::report::checks_table;
 
@@ -55,11 +56,11 @@ pub fn figures(study: &Study) -> Value {
 }
 
 fn detected(seen: &Detection) -> Value {
-    let delay = |part| finite(quantile(&seen.delays_s, part));
+    let delay = |part| finite(quantile(seen.delays_s.iter().copied(), part));
     json!({
         "runs": seen.delays_s.len(), "early_alarms": seen.early_alarms,
         "median_delay_s": delay(0.5), "p95_delay_s": delay(0.95),
-        "median_correlation": quantile(&seen.correlations, 0.5),
+        "median_correlation": quantile(seen.correlations.iter().copied(), 0.5),
     })
 }
 
@@ -204,9 +205,9 @@ fn two_reflections(study: &Study) -> String {
             "| {what} | {} | {} | {:.0}, {:.0} | {:.3} |",
             seen.delays_s.len(),
             seen.early_alarms,
-            1e3 * quantile(&seen.delays_s, 0.5),
-            1e3 * quantile(&seen.delays_s, 0.95),
-            quantile(&seen.correlations, 0.5),
+            1e3 * quantile(seen.delays_s.iter().copied(), 0.5),
+            1e3 * quantile(seen.delays_s.iter().copied(), 0.95),
+            quantile(seen.correlations.iter().copied(), 0.5),
         );
     }
     text + "\nSix deviations alarm by chance once in some twelve minutes of a closed loop (below): of 60 runs of 2 s before the onset 0.2 are expected to. As many do \

@@ -16,7 +16,8 @@ use rand_distr::StandardNormal;
 
 use super::channel::{Channel, Seen};
 use super::closed_loop::{Reflection, Setting};
-use crate::judged::in_parallel;
+use crate::judged::{in_parallel, rms};
+use crate::order::quantile;
 use crate::scenario::constellation::nominal;
 
 /// Satellites of a scenario.
@@ -117,12 +118,8 @@ fn of_number(reflected: usize, scenarios: usize) -> Result<Urban> {
         .collect();
     let sum = |count: fn(&Epoch) -> usize| epochs.iter().map(count).sum::<usize>();
     let errors = |way: usize| -> (f64, f64) {
-        let all = super::rays::ordered(epochs.iter().map(|e| e.errors_m[way]));
-        let squares = all.iter().map(|e| e * e).sum::<f64>();
-        (
-            (squares / all.len() as f64).sqrt(),
-            super::rays::quantile(&all, 0.95),
-        )
+        let all = || epochs.iter().map(|e| e.errors_m[way]);
+        (rms(all()), quantile(all(), 0.95))
     };
     Ok(Urban {
         reflected,

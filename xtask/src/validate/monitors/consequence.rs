@@ -13,6 +13,7 @@ use receiver::record::{Disposition, Event, EventKind, Status};
 use serde_json::{Value, json};
 
 use crate::judged;
+use crate::order::quantile;
 use crate::reproduce::chart::{BLUE, Chart, GREEN, RED, Series, Stroke, picture};
 use crate::scenario::built::Scenario;
 use crate::scenario::make::Level;
@@ -197,11 +198,7 @@ impl Consequence {
     /// The horizontal error that `part` of the epochs stay below, m.
     #[must_use]
     pub fn error_m(&self, part: f64) -> f64 {
-        let mut errors: Vec<f64> = self.epochs.iter().map(|e| e.error_m).collect();
-        errors.sort_by(f64::total_cmp);
-        let index = (part * errors.len() as f64) as usize;
-        let last = errors.len().saturating_sub(1);
-        errors.get(index.min(last)).copied().unwrap_or(f64::NAN)
+        quantile(self.epochs.iter().map(|e| e.error_m), part)
     }
 
     /// Part of the epochs whose error is beyond four deviations while nobody is left out.
