@@ -38,6 +38,7 @@ mod tests {
         assert_eq!(quantile(values(), 1.0), 20.0);
         assert_eq!(median(values()), 10.5);
         assert_eq!(median([3.0, 1.0, 2.0]), 2.0);
+        assert_eq!(median([4.0, 1.0, 2.0, 3.0]), 2.5);
     }
 
     #[test]

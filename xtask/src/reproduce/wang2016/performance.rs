@@ -126,4 +126,9 @@ mod tests {
         let equal = Performance::at_false_alarm_share(&runs, 0, 0.25);
         assert_eq!((equal.threshold, equal.false_alarm_runs), (3.0, 0.25));
     }
+
+    #[test]
+    fn a_mean_is_that_of_all() {
+        assert_eq!(mean((1..=20).map(f64::from)), 10.5);
+    }
 }

@@ -21,7 +21,8 @@ const MEAN_SQUARE: f64 = 0.3685;
 /// What was found so far.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Scatter {
-    code: Ratio,
+    /// Found over stated variance.
+    code: Running,
     rate: Excess,
 }
 
@@ -29,14 +30,10 @@ impl Scatter {
     /// Nothing was seen yet.
     pub(super) const fn new() -> Self {
         Self {
-            code: Ratio {
-                mean: 1.0,
-                seen_s: 0.0,
-            },
+            code: Running::from(1.0),
             rate: Excess {
-                found: 0.0,
+                found: Running::from(0.0),
                 counted: 0.0,
-                seen_s: 0.0,
             },
         }
     }
@@ -48,10 +45,12 @@ impl Scatter {
         given: impl Iterator<Item = &'a GivenOthers> + Clone,
         interval_s: f64,
     ) {
-        let code = given.clone().map(|g| g.code);
-        self.code.follow(&without_largest(code), interval_s);
-        let rate = given.filter_map(|g| g.rate);
-        self.rate.follow(&without_largest(rate), interval_s);
+        if let Some(most) = without_largest(given.clone().map(|g| g.code)) {
+            self.code.take(found_over_stated(&most), interval_s);
+        }
+        if let Some(most) = without_largest(given.filter_map(|g| g.rate)) {
+            self.rate.follow(&most, interval_s);
+        }
     }
 
     /// Variance of every range rate over the stated one, (m/s)^2.
@@ -68,14 +67,14 @@ impl Scatter {
 }
 
 /// Deviations without the largest quarter, whose channels may be faulty; none where they are too few.
-fn without_largest(deviations: impl Iterator<Item = Deviation>) -> Vec<Deviation> {
+fn without_largest(deviations: impl Iterator<Item = Deviation>) -> Option<Vec<Deviation>> {
     let mut all: Vec<Deviation> = deviations.collect();
     if all.len() < FEWEST {
-        return Vec::new();
+        return None;
     }
     all.sort_unstable_by(|a, b| a.normalised_squared().total_cmp(&b.normalised_squared()));
     all.truncate(all.len() - all.len().div_ceil(4));
-    all
+    Some(all)
 }
 
 /// Mean of `values` over deviations.
@@ -88,44 +87,43 @@ fn found_over_stated(most: &[Deviation]) -> f64 {
     mean(most, Deviation::normalised_squared) / MEAN_SQUARE
 }
 
-/// A running mean of found over stated variance.
+/// A mean over [`MEMORY_S`], or what there was.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Ratio {
+struct Running {
     mean: f64,
     seen_s: f64,
 }
 
-impl Ratio {
-    fn follow(&mut self, most: &[Deviation], interval_s: f64) {
-        if !most.is_empty() {
-            self.seen_s = (self.seen_s + interval_s).min(MEMORY_S);
-            self.mean += interval_s / self.seen_s * (found_over_stated(most) - self.mean);
-        }
+impl Running {
+    /// `mean` until there is something.
+    const fn from(mean: f64) -> Self {
+        Self { mean, seen_s: 0.0 }
+    }
+
+    fn take(&mut self, value: f64, interval_s: f64) {
+        self.seen_s = (self.seen_s + interval_s).min(MEMORY_S);
+        self.mean += interval_s / self.seen_s * (value - self.mean);
     }
 }
 
 /// The variance that most have in excess of what is stated of each.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Excess {
-    /// A running mean; below zero where they are better than stated.
-    found: f64,
+    /// Below zero where they are better than stated.
+    found: Running,
     /// What of it is more than chance, and contained in the variances that come.
     counted: f64,
-    seen_s: f64,
 }
 
 impl Excess {
-    /// A step towards the excess with which found and stated variance are the same (Newton's); what is found of the best
-    /// counts most.
+    /// Takes the excess with which found and stated variance of an epoch would be the same (Newton's step); what is
+    /// found of the best counts most.
     fn follow(&mut self, most: &[Deviation], interval_s: f64) {
-        if !most.is_empty() {
-            self.seen_s = (self.seen_s + interval_s).min(MEMORY_S);
-            let typical = 1.0 / mean(most, |d| 1.0 / d.variance);
-            let now = self.counted + typical * (found_over_stated(most) - 1.0);
-            self.found += interval_s / self.seen_s * (now - self.found);
-            let by_chance = CHANCE * (typical - self.counted).max(0.0);
-            self.counted = (self.found - by_chance).max(0.0);
-        }
+        let typical = 1.0 / mean(most, |d| 1.0 / d.variance);
+        let now = self.counted + typical * (found_over_stated(most) - 1.0);
+        self.found.take(now, interval_s);
+        let by_chance = CHANCE * (typical - self.counted).max(0.0);
+        self.counted = (self.found.mean - by_chance).max(0.0);
     }
 }
 
