@@ -46,11 +46,12 @@ impl FlankBalance {
     ///
     /// `None` where there is no peak, or a magnitude is no number.
     pub fn step(&mut self, magnitudes: &[f64; SHAPE_TAPS_CHIPS.len()]) -> Option<f64> {
-        let total: f64 = magnitudes.iter().sum();
+        let [e4, e3, e2, e1, p, l1, l2, l3, l4] = *magnitudes;
+        // In pairs, which do not wait for each other.
+        let total = ((e4 + l4) + (e3 + l3)) + ((e2 + l2) + (e1 + l1)) + p;
         if !(total > 0.0 && total.is_finite()) {
             return None;
         }
-        let [e4, e3, e2, e1, p, l1, l2, l3, l4] = *magnitudes;
         let scale = total.recip();
         // Means of both sides, per chip.
         let inner = 2.5 * scale * (p - e2 + p - l2);

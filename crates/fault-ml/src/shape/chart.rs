@@ -33,12 +33,12 @@ impl ChartSettings {
     #[must_use]
     pub fn limit(&self, steps: u32) -> f64 {
         let left = (1.0 - self.lambda).powf(2.0 * f64::from(steps));
-        self.width * self.sigma * self.mean_variance(left).sqrt()
+        self.width * self.sigma * (self.share() * (1.0 - left)).sqrt()
     }
 
-    /// Variance of the mean over that of a value, with `left` of the square of the target's weight.
-    fn mean_variance(&self, left: f64) -> f64 {
-        self.lambda / (2.0 - self.lambda) * (1.0 - left)
+    /// Variance of the mean over that of a value, after very many steps.
+    const fn share(&self) -> f64 {
+        self.lambda / (2.0 - self.lambda)
     }
 }
 
@@ -47,8 +47,11 @@ impl ChartSettings {
 pub struct EwmaChart {
     settings: ChartSettings,
     mean: f64,
-    /// Square of the weight that the target still has in the mean.
+    /// Square of the weight that the target still has in the mean, and by what it falls a step.
     left: f64,
+    fall: f64,
+    /// Variance of the mean over that of a value, in the end.
+    share: f64,
 }
 
 impl EwmaChart {
@@ -77,14 +80,19 @@ impl EwmaChart {
             settings,
             mean: settings.target,
             left: 1.0,
+            fall: (1.0 - settings.lambda).powi(2),
+            share: settings.share(),
         })
     }
 
     /// Takes a value; returns the new mean, Z.
     pub fn step(&mut self, value: f64) -> f64 {
-        let lambda = self.settings.lambda;
-        self.mean += lambda * (value - self.mean);
-        self.left *= (1.0 - lambda) * (1.0 - lambda);
+        self.mean += self.settings.lambda * (value - self.mean);
+        self.left *= self.fall;
+        // No longer seen beside one; it would never become zero, only a number that is slow to multiply by.
+        if self.left < f64::EPSILON / 4.0 {
+            self.left = 0.0;
+        }
         self.mean
     }
 
@@ -103,13 +111,13 @@ impl EwmaChart {
     /// Half the distance of the limits at this step: upper and lower limit lie so far from the target.
     #[must_use]
     pub fn limit(&self) -> f64 {
-        self.settings.width * self.settings.sigma * self.settings.mean_variance(self.left).sqrt()
+        self.settings.width * self.settings.sigma * self.mean_variance_of(1.0).sqrt()
     }
 
     /// Variance of the mean at this step (8), for values of another `variance` than was set.
     #[must_use]
     pub fn mean_variance_of(&self, variance: f64) -> f64 {
-        variance * self.settings.mean_variance(self.left)
+        variance * self.share * (1.0 - self.left)
     }
 
     /// Whether the mean is outside its limits.
@@ -129,6 +137,16 @@ impl EwmaChart {
 mod tests {
     use super::*;
     use crate::golden::{numbers, text};
+
+    #[test]
+    fn limits_end_where_they_would_for_ever() {
+        let mut chart = EwmaChart::new(ChartSettings::default()).unwrap();
+        for _ in 0..20_000 {
+            chart.step(0.01);
+        }
+        assert_eq!(chart.left, 0.0);
+        assert_eq!(chart.limit(), ChartSettings::default().limit(u32::MAX));
+    }
 
     #[test]
     fn limits_are_those_of_the_reference() {

@@ -20,6 +20,21 @@ pub struct Shape {
     pub magnitudes: [f64; SHAPE_TAPS_CHIPS.len()],
 }
 
+impl Shape {
+    /// What is said where no peak is found: nothing, or that there are no numbers to find it in.
+    fn without_peak(&self) -> Result<ChannelVerdict, MonitorError> {
+        let total: f64 = self.magnitudes.iter().sum();
+        if total.is_finite() {
+            return Ok(ChannelVerdict::Unavailable);
+        }
+        Err(MonitorError::Value {
+            name: "sum of the magnitudes of a shape",
+            value: total,
+            expected: "a finite number",
+        })
+    }
+}
+
 /// Settings of [`ShapeMonitor`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ShapeSettings {
@@ -124,16 +139,8 @@ impl ChannelMonitor for ShapeMonitor {
     }
 
     fn step(&mut self, input: &Shape) -> Result<ChannelVerdict, MonitorError> {
-        let total: f64 = input.magnitudes.iter().sum();
-        if !total.is_finite() {
-            return Err(MonitorError::Value {
-                name: "sum of the magnitudes of a shape",
-                value: total,
-                expected: "a finite number",
-            });
-        }
         let Some(observed) = self.balance.step(&input.magnitudes) else {
-            return Ok(ChannelVerdict::Unavailable);
+            return input.without_peak();
         };
         self.observe(observed);
         let Some(remaining) = self

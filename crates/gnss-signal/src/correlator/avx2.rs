@@ -23,6 +23,12 @@ const VECTORS: usize = BLOCK_SAMPLES / LANES;
 /// Below this half a vector may span more chips than one table look-up reaches.
 pub(super) const LOWEST_SAMPLE_RATE_HZ: f64 = 1.8e6;
 
+/// Chips that `vpshufb` reaches from the first of a window.
+const REACH_CHIPS: f64 = 15.0;
+
+/// Windows of the code that a block looks up, at most: one for each half of a vector.
+const MOST_WINDOWS: usize = 2 * VECTORS;
+
 /// In-phase and quadrature sums by lane.
 type Sums = [__m256; 2];
 
@@ -30,6 +36,8 @@ type Sums = [__m256; 2];
 #[derive(Debug)]
 pub(super) struct Avx2 {
     lanes: LaneTables,
+    /// Windows of the code that a block looks up.
+    windows: usize,
     baseband: Baseband,
     phases: [u64; MAX_TAPS],
     sums: [Sums; MAX_TAPS],
@@ -41,8 +49,8 @@ pub(super) fn is_supported() -> bool {
 }
 
 impl Avx2 {
-    /// The kernel, which exists only where the processor can run it.
-    pub(super) fn new() -> Result<Self, SignalError> {
+    /// The kernel for samples of this rate, which exists only where the processor can run it.
+    pub(super) fn new(sample_rate_hz: f64) -> Result<Self, SignalError> {
         if !is_supported() {
             return Err(InstructionSet::Avx2.unsupported());
         }
@@ -52,18 +60,33 @@ impl Avx2 {
             let (half, sample) = (byte / 8 % 2, byte % 8);
             (32 * vector + 16 * half + 8 * quarter + sample) as u8
         });
-        // `vpshufb` looks up within 16 bytes: each half of a vector has its own window.
-        let origin = std::array::from_fn(|byte| (byte / 32 * 32 + byte / 16 % 2 * 8) as u8);
+        let windows = windows_of_block(sample_rate_hz);
+        let origin = if windows == MOST_WINDOWS {
+            std::array::from_fn(|byte| (byte / 32 * 32 + byte / 16 % 2 * 8) as u8)
+        } else {
+            let samples = BLOCK_SAMPLES / windows;
+            std::array::from_fn(|byte| (byte / samples * samples) as u8)
+        };
         // SAFETY: all bits zero are floats, and the instruction set is there.
         let zero = unsafe { [_mm256_setzero_ps(); 2] };
         Ok(Self {
             lanes: LaneTables::new(order, origin),
+            windows,
             baseband: Baseband::zeroed(),
             phases: [0; MAX_TAPS],
             sums: [zero; MAX_TAPS],
             baseband_sums: zero,
         })
     }
+}
+
+/// So few that each reaches its samples, at a code rate 5 % above the nominal one.
+fn windows_of_block(sample_rate_hz: f64) -> usize {
+    let step_chips = 1.05 * 1.023e6 / sample_rate_hz;
+    let reaches =
+        |windows: &usize| (BLOCK_SAMPLES / windows - 1) as f64 * step_chips <= REACH_CHIPS;
+    let whole_vectors = [1, VECTORS].into_iter();
+    whole_vectors.filter(reaches).min().unwrap_or(MOST_WINDOWS)
 }
 
 impl Kernel for Avx2 {
@@ -143,6 +166,7 @@ fn add(
 ) {
     let Avx2 {
         lanes,
+        windows,
         baseband,
         phases,
         sums,
@@ -165,28 +189,28 @@ fn add(
         step: interval.code_step(BLOCK_SAMPLES),
         turn,
     };
-    let taps = interval.taps;
-    let (phases, rest_phases) = phases[..taps].as_chunks_mut();
-    let (sums, rest_sums) = sums[..taps].as_chunks_mut();
-    for (phases, sums) in phases.iter_mut().zip(sums) {
-        add_taps::<4>(&chunk, phases, sums);
+    let (phases, sums) = (&mut phases[..interval.taps], &mut sums[..interval.taps]);
+    match *windows {
+        1 => add_all_taps::<1>(&chunk, phases, sums),
+        VECTORS => add_all_taps::<VECTORS>(&chunk, phases, sums),
+        _ => add_all_taps::<MOST_WINDOWS>(&chunk, phases, sums),
     }
-    match (rest_phases, rest_sums) {
-        ([a, b, c], [x, y, z]) => {
-            let (mut phases, mut sums) = ([*a, *b, *c], [*x, *y, *z]);
-            add_taps::<3>(&chunk, &mut phases, &mut sums);
-            [*a, *b, *c] = phases;
-            [*x, *y, *z] = sums;
-        }
-        (phases, sums) => {
-            for (phase, sum) in phases.iter_mut().zip(sums) {
-                add_taps::<1>(
-                    &chunk,
-                    std::array::from_mut(phase),
-                    std::array::from_mut(sum),
-                );
-            }
-        }
+}
+
+/// Adds a chunk to every tap, two at a time: their sums stay in registers, which those of more do not.
+#[target_feature(enable = "avx2,fma")]
+fn add_all_taps<const WINDOWS: usize>(chunk: &Chunk<'_>, phases: &mut [u64], sums: &mut [Sums]) {
+    let (phases, rest_phases) = phases.as_chunks_mut();
+    let (sums, rest_sums) = sums.as_chunks_mut();
+    for (phases, sums) in phases.iter_mut().zip(sums) {
+        add_taps::<2, WINDOWS>(chunk, phases, sums);
+    }
+    for (phase, sum) in rest_phases.iter_mut().zip(rest_sums) {
+        add_taps::<1, WINDOWS>(
+            chunk,
+            std::array::from_mut(phase),
+            std::array::from_mut(sum),
+        );
     }
 }
 
@@ -201,7 +225,7 @@ struct Chunk<'a> {
 }
 
 #[target_feature(enable = "avx2,fma")]
-fn add_taps<const TAPS: usize>(
+fn add_taps<const TAPS: usize, const WINDOWS: usize>(
     chunk: &Chunk<'_>,
     phases: &mut [u64; TAPS],
     sums: &mut [Sums; TAPS],
@@ -209,9 +233,8 @@ fn add_taps<const TAPS: usize>(
     let mut in_phase = [_mm256_setzero_si256(); TAPS];
     let mut quadrature = [_mm256_setzero_si256(); TAPS];
     let mut now = *phases;
-    let origin = |byte: usize| chunk.lanes.origin_chips(byte) & 127;
-    let origins: [[usize; 2]; VECTORS] =
-        std::array::from_fn(|vector| [0, LANES / 2].map(|half| origin(vector * LANES + half)));
+    let origins: [usize; MOST_WINDOWS] =
+        std::array::from_fn(|half| chunk.lanes.origin_chips(half * LANES / 2) & 127);
     let (i_blocks, _) = chunk.baseband.i.as_chunks::<BLOCK_SAMPLES>();
     let (q_blocks, _) = chunk.baseband.q.as_chunks::<BLOCK_SAMPLES>();
     for (i, q) in i_blocks.iter().zip(q_blocks).take(chunk.blocks) {
@@ -221,8 +244,14 @@ fn add_taps<const TAPS: usize>(
             let chip = (phase >> 32) as usize & 1023;
             let row = chunk.lanes.row(phase as u32).as_chunks::<LANES>().0;
             for (vector, (&i, &q)) in i.iter().zip(&q).enumerate() {
-                let [first, second] = origins[vector];
-                let windows = windows(chunk.code, chip + first, chip + second);
+                let half = if WINDOWS == 1 { 0 } else { 2 * vector };
+                let first = window(chunk.code, chip + origins[half]);
+                let windows = if WINDOWS == MOST_WINDOWS {
+                    let second = window(chunk.code, chip + origins[half + 1]);
+                    _mm256_set_m128i(second, first)
+                } else {
+                    _mm256_broadcastsi128_si256(first)
+                };
                 let code = _mm256_shuffle_epi8(windows, load(&row[vector]));
                 in_phase[tap] = _mm256_add_epi16(in_phase[tap], _mm256_maddubs_epi16(code, i));
                 quadrature[tap] = _mm256_add_epi16(quadrature[tap], _mm256_maddubs_epi16(code, q));
@@ -237,17 +266,13 @@ fn add_taps<const TAPS: usize>(
     }
 }
 
-/// 16 chips of the code from `first` on and 16 from `second` on (each at most 1023 + 127).
+/// 16 chips of the code from `chip` (at most 1023 + 127) on.
 #[inline]
 #[target_feature(enable = "avx2,fma")]
-fn windows(code: &CodeBits, first: usize, second: usize) -> __m256i {
+fn window(code: &CodeBits, chip: usize) -> __m128i {
     const { assert!(size_of::<CodeBits>() >= 1023 + 127 + 16) };
-    // SAFETY: both windows lie within `CodeBits`, and the loads ask for no alignment.
-    unsafe {
-        let first = _mm_loadu_si128(code.as_ptr().add(first).cast());
-        let second = _mm_loadu_si128(code.as_ptr().add(second).cast());
-        _mm256_set_m128i(second, first)
-    }
+    // SAFETY: the window lies within `CodeBits`, and the load asks for no alignment.
+    unsafe { _mm_loadu_si128(code.as_ptr().add(chip).cast()) }
 }
 
 /// The vectors of a block.

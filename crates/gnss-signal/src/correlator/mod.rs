@@ -67,7 +67,9 @@ impl Correlator {
             InstructionSet::Reference => Kernel::Reference,
             InstructionSet::Portable => portable_kernel(),
             #[cfg(target_arch = "x86_64")]
-            InstructionSet::Avx2 => Kernel::Avx2(FixedPoint::boxed(avx2::Avx2::new()?)),
+            InstructionSet::Avx2 => {
+                Kernel::Avx2(FixedPoint::boxed(avx2::Avx2::new(sample_rate_hz)?))
+            }
             #[cfg(target_arch = "x86_64")]
             InstructionSet::Avx512 => Kernel::Avx512(FixedPoint::boxed(avx512::Avx512::new()?)),
             #[cfg(not(target_arch = "x86_64"))]
