@@ -297,3 +297,21 @@ fn a_wrong_ephemeris_is_noticed_and_harmless() {
         }
     }
 }
+
+#[test]
+fn what_an_excluded_satellite_said_is_taken_back() {
+    let fault = "fault=[{kind=\"ramp\",sat=\"G17\",begin_s=50,rate_mps=2}]";
+    let scenario = scenario("static-open-sky", &["duration_s=80", fault], None);
+    let after_m = |hindsight_s| {
+        let mut settings = vector(&scenario);
+        let vector = settings.vector.as_mut().unwrap();
+        vector.hindsight_s = hindsight_s;
+        let judged = receive(&scenario, Level::Correlator, &settings).unwrap();
+        let excluded_s = happened(&judged, 0.0, |k| matches!(k, EventKind::Excluded { .. }));
+        let begin_s = excluded_s.unwrap();
+        let errors = judged.between(begin_s, begin_s + 2.0);
+        errors.map(JudgedEpoch::horizontal_m).fold(0.0, f64::max)
+    };
+    let (taken_back, kept) = (after_m(10.0), after_m(0.0));
+    assert!(taken_back < 0.5 * kept, "{taken_back} and {kept} m");
+}

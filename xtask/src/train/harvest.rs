@@ -17,13 +17,17 @@ pub trait Pupil: Sync {
 }
 
 /// The receiver as it comes: updates 50 times a second, the innovation test excluding what it finds, so that
-/// one faulty channel does not spoil the others.
+/// one faulty channel does not spoil the others. What the filter took in before an alarm it keeps: a monitor learns
+/// what comes before its own.
 #[derive(Debug, Clone, Copy)]
 pub struct Product;
 
 impl Pupil for Product {
     fn settings(&self, scenario: &Scenario) -> Settings {
-        let vector = VectorSettings::default();
+        let vector = VectorSettings {
+            hindsight_s: 0.0,
+            ..VectorSettings::default()
+        };
         Settings {
             rate_hz: 1.0 / vector.interval_s,
             vector: Some(vector),

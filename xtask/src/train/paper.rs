@@ -83,13 +83,15 @@ pub fn scenario(flight: Flight, cn0_dbhz: i64, seed: u64) -> Result<Scenario> {
     )
 }
 
-/// The papers' receiver, every update reported, its noise that of the class, the innovation test excluding.
+/// The papers' receiver, every update reported, its noise that of the class, the innovation test excluding; what its
+/// filter took in before an alarm it keeps.
 #[must_use]
 pub fn settings(scenario: &Scenario, cn0_dbhz: i64) -> Settings {
     let mut settings = Variant::PaperExcluding.settings(scenario);
     settings.rate_hz = 1.0 / INTERVAL_S;
     let cn0_dbhz = cn0_dbhz as f64;
     if let Some(vector) = &mut settings.vector {
+        vector.hindsight_s = 0.0;
         vector.noise = MeasurementNoise::Fixed {
             pseudorange_m2: tracking_noise::code_variance_m2(cn0_dbhz, INTERVAL_S, SPACING_CHIPS),
             range_rate_m2_s2: tracking_noise::sum_pair_rate_variance_m2_s2(cn0_dbhz, INTERVAL_S),

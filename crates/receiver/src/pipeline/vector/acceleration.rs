@@ -47,3 +47,17 @@ impl Velocities {
         mean * (1.0 - SIGNIFICANT_SIGMAS2 * noise / mean.norm_squared()).max(0.0)
     }
 }
+
+/// What an acceleration of the receiver makes of the range rate of a satellite within `age_s`, m/s; positions and
+/// acceleration ECEF.
+pub(super) fn change_of_rate_mps(
+    acceleration_mps2: &Vector3<f64>,
+    satellite_m: &Vector3<f64>,
+    receiver_m: &Vector3<f64>,
+    age_s: f64,
+) -> f64 {
+    -(satellite_m - receiver_m)
+        .normalize()
+        .dot(acceleration_mps2)
+        * age_s
+}

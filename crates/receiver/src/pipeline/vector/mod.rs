@@ -7,6 +7,8 @@ mod acceleration;
 mod bit_slip;
 mod clock_step;
 mod filter;
+mod hindsight;
+mod judge;
 mod monitors;
 mod report;
 mod restart;
@@ -27,22 +29,20 @@ use gnss_nav::filter::{
 use gnss_nav::measurement::form;
 use gnss_nav::prediction::Expected;
 use gnss_nav::{
-    EphemerisStore, GpsTime, Measurement, MeasurementModel, NavState, RawMeasurement, SatelliteId,
-    Solution,
+    EphemerisStore, GpsTime, MeasurementModel, NavState, RawMeasurement, SatelliteId, Solution,
 };
 use gnss_signal::tracking::{ChannelEpoch, Lock};
 use nalgebra::{Vector3, Vector4};
 
-use super::belief::Change;
 use super::shape::{ShapeSaid, ShapeWatch};
 use super::slot::Slot;
 use crate::ReceiverError;
 use crate::record::EventKind;
 
-use acceleration::Velocities;
+use acceleration::{Velocities, change_of_rate_mps};
 use filter::from_solution;
+use hindsight::{Hindsight, Taken};
 pub(super) use monitors::Monitor;
-use monitors::deviations;
 pub(super) use report::{change, observations};
 use scatter::Scatter;
 pub use settings::{FilterKind, MeasurementNoise, Policy, VectorSettings};
@@ -153,6 +153,7 @@ pub(super) struct VectorTracking {
     /// Whether satellites found faulty were weighted at the last epoch, as too few would have been left.
     too_few_left: bool,
     velocities: Velocities,
+    hindsight: Hindsight,
     acceleration_mps2: Vector3<f64>,
     /// The last epoch.
     pub(super) tick: u64,
@@ -190,6 +191,7 @@ impl VectorTracking {
             contradicting: 0,
             too_few_left: false,
             velocities: Velocities::default(),
+            hindsight: Hindsight::default(),
             acceleration_mps2: Vector3::zeros(),
             tick: around.tick,
             started: solution.gps_time(),
@@ -257,15 +259,7 @@ impl VectorTracking {
         model: &MeasurementModel,
         slots: &mut [Slot],
     ) -> Result<Epoch, ReceiverError> {
-        let to = self.state().gps_time(around.receive_time);
-        let interval_s = to - self.state().time;
-        let measured = self.fixed == self.state().time;
-        self.acceleration_mps2 = self
-            .velocities
-            .mean_acceleration_mps2(&self.filter.covariance(), measured);
-        self.filter.predict(to)?;
-        self.filter
-            .accelerate(&self.acceleration_mps2, interval_s)?;
+        let mut now = self.predict(around.receive_time)?;
         self.tick = around.tick;
         let mut epoch = Epoch::default();
         self.contradicting = 0;
@@ -277,7 +271,10 @@ impl VectorTracking {
         if *model != self.model {
             self.remodel(*model, &measurements)?;
         }
-        self.update(&measurements, &mut epoch)?;
+        now.measurements = measurements;
+        let ages = epoch.members.iter().filter(|m| m.raw.is_some());
+        now.ages_s = ages.map(|m| (m.satellite, m.epoch.doppler_age_s)).collect();
+        self.update(now, &mut epoch)?;
         if self.contradicting >= CONTRADICTING {
             self.outlook = Outlook::Contradicted;
         }
@@ -337,8 +334,12 @@ impl VectorTracking {
 
     /// A range rate measured `age_s` ago, carried to the epoch by the receiver's acceleration.
     fn carried(&self, raw: RawMeasurement, age_s: f64, expected: &Expected) -> RawMeasurement {
-        let path = expected.state.position_ecef_m - self.state().position_ecef_m;
-        let change_mps = -path.normalize().dot(&self.acceleration_mps2) * age_s;
+        let change_mps = change_of_rate_mps(
+            &self.acceleration_mps2,
+            &expected.state.position_ecef_m,
+            &self.state().position_ecef_m,
+            age_s,
+        );
         RawMeasurement {
             range_rate_mps: raw.range_rate_mps + change_mps,
             ..raw
@@ -357,13 +358,6 @@ impl VectorTracking {
         }
     }
 
-    fn watch(&mut self, satellite: SatelliteId) -> &mut Watch {
-        let clean = (READMIT_S / self.settings.interval_s) as u32;
-        self.watches
-            .entry(satellite)
-            .or_insert_with(|| Watch::new(self.monitors.clone(), clean))
-    }
-
     /// What is expected of a satellite at the epoch.
     pub(super) fn expected(
         &self,
@@ -377,26 +371,37 @@ impl VectorTracking {
         expected.ok()
     }
 
-    fn update(
-        &mut self,
-        measurements: &[Measurement],
-        epoch: &mut Epoch,
-    ) -> Result<(), ReceiverError> {
+    fn update(&mut self, mut now: Taken, epoch: &mut Epoch) -> Result<(), ReceiverError> {
+        let measurements = &now.measurements;
         if measurements
             .iter()
             .any(|m| m.range_rate_variance_m2.is_finite())
         {
             let white = self.settings.process_noise.clock.white_m2_per_s;
-            self.filter.loosen_drift(white / self.settings.interval_s)?;
+            now.drift_variance_m2_s2 = white / self.settings.interval_s;
+            self.filter.loosen_drift(now.drift_variance_m2_s2)?;
         }
         let mut innovations = self.filter.innovations(measurements)?;
         if let Some(step) = clock_step::find(&innovations) {
             self.step_clock(&step, epoch)?;
             innovations = self.filter.innovations(measurements)?;
         }
-        let dispositions = self.judge(&innovations, epoch)?;
-        let update = self.filter.update(&innovations, &dispositions)?;
-        self.note(&innovations, &dispositions, &update, epoch);
+        self.show(&innovations, &mut epoch.members)?;
+        let shown = epoch
+            .members
+            .iter()
+            .filter_map(|m| Some((m.satellite, m.shown?)));
+        now.shown = shown.collect();
+        now.told = self.believe(&innovations, epoch);
+        if let Some(again) = self.take_back(&mut now)? {
+            innovations = again;
+            for member in &mut epoch.members {
+                member.shown = now.step(member.satellite);
+            }
+        }
+        let (measurements, dispositions) = (&now.measurements, &now.told);
+        let update = self.filter.update(&innovations, dispositions)?;
+        self.note(&innovations, dispositions, &update, epoch);
         match self.faults.observe(&innovations, &update) {
             Advice::Reset(channels) => {
                 self.reset(measurements, channels.len(), epoch)?;
@@ -404,65 +409,15 @@ impl VectorTracking {
             Advice::Isolate(channels) => self.isolate(&channels, epoch),
             Advice::Nothing => {}
         }
+        if self.settings.takes_back() {
+            self.hindsight.keep(now, self.settings.hindsight_s);
+        }
         let covariance = self.filter.covariance();
         let position: f64 = [0, 2, 4].iter().map(|i| covariance[(*i, *i)]).sum();
         if (position / 3.0 + covariance[(6, 6)]).sqrt() > LOST_M {
             self.outlook = Outlook::Lost;
         }
         Ok(())
-    }
-
-    /// Every monitor's say, and what follows from it.
-    fn judge(
-        &mut self,
-        innovations: &Innovations,
-        epoch: &mut Epoch,
-    ) -> Result<Vec<(SatelliteId, Disposition)>, ReceiverError> {
-        let policy = self.settings.policy;
-        let mut dispositions = Vec::new();
-        let mut weighted = Vec::new();
-        let believed = |satellite| {
-            let watch = self.watches.get(&satellite);
-            watch.is_none_or(|watch| !watch.is_suspended())
-        };
-        let given = deviations(
-            innovations,
-            &self.filter.covariance(),
-            &mut self.scatter,
-            self.settings.interval_s,
-            believed,
-        )?;
-        for (innovation, given) in innovations.satellites().iter().zip(&given) {
-            let satellite = innovation.satellite;
-            let mut members = epoch.members.iter_mut();
-            let Some(member) = members.find(|m| m.satellite == satellite) else {
-                continue;
-            };
-            let step = monitors::step(innovation, given, &member.epoch);
-            member.shown = Some(step);
-            let (shape, raw) = (member.shape, member.raw);
-            let variance_m2 = raw.map_or(f64::INFINITY, |r| r.pseudorange_variance_m2);
-            let watch = self.watch(satellite);
-            let change = watch.judge(&step, shape)?;
-            let disposition = watch.disposition(policy, variance_m2.sqrt());
-            weighted.push(watch.weighted(variance_m2.sqrt()));
-            dispositions.push((satellite, disposition));
-            if let Some(change) = change {
-                let kind = report::change(&change, policy);
-                epoch.events.push((Some(satellite), kind));
-                if change == Change::Cleared {
-                    self.faults.forget(satellite);
-                }
-            }
-        }
-        let weighted = too_few::weight(&mut dispositions, &weighted);
-        if (weighted > 0) != self.too_few_left {
-            self.too_few_left = weighted > 0;
-            epoch
-                .events
-                .push((None, EventKind::TooFewLeft { weighted }));
-        }
-        Ok(dispositions)
     }
 
     /// Remembers what an update used.
@@ -501,19 +456,6 @@ impl VectorTracking {
         {
             self.geometry = Some(geometry);
             self.fixed = self.state().time;
-        }
-    }
-
-    /// Suspends channels of which the gate keeps refusing measurements (Li2019), where they are watched.
-    fn isolate(&mut self, channels: &[SatelliteId], epoch: &mut Epoch) {
-        let policy = self.settings.policy;
-        for satellite in channels {
-            let skipped = f64::from(self.faults.skipped_epochs(*satellite));
-            let Some(change) = self.watch(*satellite).isolate(skipped) else {
-                continue;
-            };
-            let kind = report::change(&change, policy);
-            epoch.events.push((Some(*satellite), kind));
         }
     }
 

@@ -103,18 +103,40 @@ pub(super) fn step(
     given: &GivenOthers,
     epoch: &ChannelEpoch,
 ) -> ChannelStep {
-    let number = |i: &filter::Innovation| (i.value(), i.variance());
-    let deviation = |d: &Deviation| (d.value, d.variance);
-    let rate = innovation.rate.as_ref().map(number);
-    let given_rate = given.rate.as_ref().map(deviation);
     ChannelStep {
         satellite: innovation.satellite.prn.into(),
-        innovation: pair(number(&innovation.code), rate),
-        given_others: pair(deviation(&given.code), given_rate),
+        innovation: of_filter(innovation),
+        given_others: of_others(given),
         cn0_dbhz: epoch.cn0_dbhz,
         cn0_now_hz: epoch.cn0_now_hz,
         tap_ratios: epoch.tap_ratios,
     }
+}
+
+/// `step` as it would have been had the filter been another.
+pub(super) fn step_again(
+    step: &ChannelStep,
+    innovation: &SatelliteInnovation,
+    given: &GivenOthers,
+) -> ChannelStep {
+    ChannelStep {
+        innovation: of_filter(innovation),
+        given_others: of_others(given),
+        ..*step
+    }
+}
+
+fn of_filter(innovation: &SatelliteInnovation) -> Innovation {
+    let number = |i: &filter::Innovation| (i.value(), i.variance());
+    pair(
+        number(&innovation.code),
+        innovation.rate.as_ref().map(number),
+    )
+}
+
+fn of_others(given: &GivenOthers) -> Innovation {
+    let number = |d: &Deviation| (d.value, d.variance);
+    pair(number(&given.code), given.rate.as_ref().map(number))
 }
 
 /// Value and variance of a pseudorange and, where there is one, of a range rate.

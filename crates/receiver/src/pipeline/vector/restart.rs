@@ -21,6 +21,7 @@ impl VectorTracking {
         step: &ClockStep,
         epoch: &mut Epoch,
     ) -> Result<(), ReceiverError> {
+        self.hindsight.clear();
         let mut state = *self.state();
         let mut covariance = self.filter.covariance();
         state.clock_bias_m += step.size_m;
@@ -41,6 +42,7 @@ impl VectorTracking {
     ) -> Result<(), ReceiverError> {
         let covariance = self.filter.covariance();
         let before = self.filter.innovations(measurements)?;
+        self.hindsight.clear();
         self.model = model;
         self.filter = filter(*self.state(), covariance, &model, &self.settings)?;
         if let Ok(shift) = self.filter.innovations(measurements)?.shift_from(&before) {
@@ -77,6 +79,7 @@ impl VectorTracking {
         self.filter = from_solution(&solution, measurements, &self.model, &self.settings)?;
         self.watches.clear();
         self.velocities.clear();
+        self.hindsight.clear();
         Ok(())
     }
 }

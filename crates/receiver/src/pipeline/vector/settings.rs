@@ -13,6 +13,9 @@ use crate::ReceiverError;
 /// Longest time between two updates, s: the steering of a car does not hold longer.
 const LONGEST_INTERVAL_S: f64 = 1.0;
 
+/// Longest time that is taken back, s: the filter takes it in again within one epoch.
+const LONGEST_HINDSIGHT_S: f64 = 60.0;
+
 /// Which filter, by how it takes in an epoch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FilterKind {
@@ -71,6 +74,9 @@ pub struct VectorSettings {
     pub learned: Vec<Arc<LearnedModel>>,
     /// What follows from its alarms. Default: exclusion.
     pub policy: Policy,
+    /// For how long before an alarm the filter takes back what the satellite said, s; with 0 it lets it be. Default 10: a ramp
+    /// that is just slow enough for the gate is found within that.
+    pub hindsight_s: f64,
 }
 
 impl Policy {
@@ -89,6 +95,12 @@ impl VectorSettings {
             let given = self.interval_s;
             return Err(ReceiverError::Option {
                 what: format!("the filter's interval is {given} s: expected above 0 and at most 1"),
+            });
+        }
+        if !(0.0..=LONGEST_HINDSIGHT_S).contains(&self.hindsight_s) {
+            let given = self.hindsight_s;
+            return Err(ReceiverError::Option {
+                what: format!("the filter takes back {given} s: expected 0 to 60"),
             });
         }
         let test = self.monitor.map(InnovationTest::new).transpose()?;
@@ -116,6 +128,11 @@ impl VectorSettings {
         })
     }
 
+    /// Whether an alarm changes what the filter took in before it.
+    pub(super) fn takes_back(&self) -> bool {
+        self.hindsight_s > 0.0 && self.policy != Policy::Observe
+    }
+
     /// Whether an update is due `since_s` after the last, give or take the rounding of ticks.
     pub(super) fn is_due(&self, since_s: f64) -> bool {
         since_s > self.interval_s * (1.0 - 1e-3)
@@ -137,6 +154,7 @@ impl Default for VectorSettings {
             }),
             learned: Vec::new(),
             policy: Policy::Exclude,
+            hindsight_s: 10.0,
         }
     }
 }
@@ -165,6 +183,14 @@ mod tests {
         };
         let text = settings.monitors().unwrap_err().to_string();
         assert!(text.starts_with("the filter's interval is NaN s"), "{text}");
+        for hindsight_s in [-1.0, 61.0, f64::NAN] {
+            let settings = VectorSettings {
+                hindsight_s,
+                ..VectorSettings::default()
+            };
+            let text = settings.monitors().unwrap_err().to_string();
+            assert!(text.starts_with("the filter takes back"), "{text}");
+        }
         let settings = VectorSettings {
             monitor: Some(InnovationTestSettings {
                 window: 1,

@@ -1,7 +1,7 @@
 //! A satellite's monitors in vector tracking, and whether it is believed.
 
-use fault_ml::ChannelVerdict;
 use fault_ml::learned::ChannelStep;
+use fault_ml::{ChannelVerdict, Health};
 use gnss_nav::filter::Disposition;
 
 use super::monitors::Monitor;
@@ -16,8 +16,8 @@ pub(super) struct Watch {
     monitors: Vec<Monitor>,
     belief: Belief,
     judgements: Vec<Said>,
-    /// How much too long the shape of the correlation takes the pseudorange to be, m.
-    shape_error_m: Option<f64>,
+    /// What the shape of the correlation said last.
+    shape: Option<ShapeSaid>,
     is_watched: bool,
 }
 
@@ -30,7 +30,7 @@ impl Watch {
             monitors,
             belief: Belief::new(clean_to_readmit),
             judgements: Vec::new(),
-            shape_error_m: None,
+            shape: None,
         }
     }
 
@@ -38,30 +38,61 @@ impl Watch {
     pub(super) fn lost(&mut self) {
         self.monitors.iter_mut().for_each(Monitor::reset);
         self.judgements.clear();
-        self.shape_error_m = None;
+        self.shape = None;
     }
 
     /// Shows this epoch to every monitor, and takes what the `shape` of the correlation says, which is
-    /// watched integration by integration; returns what changed by it.
+    /// watched integration by integration.
     ///
     /// # Errors
     /// Where the innovation is no number.
-    pub(super) fn judge(
+    pub(super) fn hear(
         &mut self,
         step: &ChannelStep,
         shape: Option<ShapeSaid>,
-    ) -> Result<Option<Change>, ReceiverError> {
+    ) -> Result<(), ReceiverError> {
         self.judgements.clear();
         for monitor in &mut self.monitors {
             if let ChannelVerdict::Judged(judgement) = monitor.step(step)? {
                 self.judgements.push((monitor.name(), judgement));
             }
         }
-        self.shape_error_m = shape.map(|s| s.error_m);
+        self.shape = shape;
         self.judgements
             .extend(shape.map(|s| (shape::NAME, s.judgement)));
         self.is_watched |= shape.is_some();
-        Ok(self.belief.follow(&self.judgements))
+        Ok(())
+    }
+
+    /// Shows the last epochs to every monitor as if they were the first: the filter, and so the innovations, were
+    /// others than those they saw. What is not believed stays as it is.
+    ///
+    /// # Errors
+    /// As [`Self::hear`].
+    pub(super) fn hear_again(&mut self, steps: &[ChannelStep]) -> Result<(), ReceiverError> {
+        if self.is_suspended() || steps.is_empty() {
+            return Ok(());
+        }
+        self.monitors.iter_mut().for_each(Monitor::reset);
+        steps
+            .iter()
+            .try_for_each(|step| self.hear(step, self.shape))
+    }
+
+    /// By how much a satellite that is believed exceeds a threshold, the largest score over its threshold; `None` where
+    /// it exceeds none.
+    pub(super) fn alarm(&self) -> Option<f64> {
+        let judged = self.judgements.iter().map(|(_, judgement)| judgement);
+        let faulty = judged.filter(|j| j.health() == Health::Faulty);
+        let excess = faulty.map(|j| j.score() / j.threshold());
+        excess
+            .max_by(f64::total_cmp)
+            .filter(|_| !self.is_suspended())
+    }
+
+    /// Follows what was heard last; returns what changed by it.
+    pub(super) fn follow(&mut self) -> Option<Change> {
+        self.belief.follow(&self.judgements)
     }
 
     /// The gate refused measurements of `skipped` of the last epochs; returns what changed by it.
@@ -77,7 +108,7 @@ impl Watch {
 
     /// What the filter is to do with the satellite, whose pseudorange has a deviation of `sigma_m`.
     pub(super) fn disposition(&self, policy: Policy, sigma_m: f64) -> Disposition {
-        let error_over_sigma = self.shape_error_m.map(|e| e / sigma_m);
+        let error_over_sigma = self.shape.map(|s| s.error_m / sigma_m);
         self.belief.disposition(policy, error_over_sigma)
     }
 
