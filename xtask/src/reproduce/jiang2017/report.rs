@@ -181,6 +181,8 @@ const EXPLANATION: &str = "\
 second enter with the weight of a good range rate, and the healthy channels are steered away from their signals.
 - The product hardly needs the exclusion: a channel that sees its signal gone says nothing. Its alarm is the channel's own, before the monitor has \
 any innovation to judge (column 5).
+- Exclusion here means more than in the paper: the noise of the last intervals is in the filter when the alarm comes, and makes healthy channels contradict it. The \
+filter goes back ten seconds and takes in all measurements again without the satellite.
 
 ";
 
