@@ -9,7 +9,7 @@ use super::{
     InstructionSet,
     carrier_table::{CarrierTable, TableAmplitude},
     code_bits::CodeBits,
-    fixed_point::{BLOCK_SAMPLES, Baseband, CODE_PERIOD, Interval, Kernel},
+    fixed_point::{BLOCK_SAMPLES, Baseband, Interval, Kernel, MOST_CHIPS, within_period},
     lane_table::{LaneTable, LaneTables},
 };
 use crate::{MAX_TAPS, SignalError};
@@ -241,7 +241,7 @@ fn add_taps<const TAPS: usize, const WINDOWS: usize>(
         let (i, q) = (vectors(i), vectors(q));
         for tap in 0..TAPS {
             let phase = now[tap];
-            let chip = (phase >> 32) as usize & 1023;
+            let chip = (phase >> 32) as usize & MOST_CHIPS;
             let row = chunk.lanes.row(phase as u32).as_chunks::<LANES>().0;
             for (vector, (&i, &q)) in i.iter().zip(&q).enumerate() {
                 let half = if WINDOWS == 1 { 0 } else { 2 * vector };
@@ -256,21 +256,20 @@ fn add_taps<const TAPS: usize, const WINDOWS: usize>(
                 in_phase[tap] = _mm256_add_epi16(in_phase[tap], _mm256_maddubs_epi16(code, i));
                 quadrature[tap] = _mm256_add_epi16(quadrature[tap], _mm256_maddubs_epi16(code, q));
             }
-            let next = phase + chunk.step;
-            now[tap] = next.min(next.wrapping_sub(CODE_PERIOD));
+            now[tap] = phase + chunk.step;
         }
     }
-    *phases = now;
+    *phases = now.map(within_period);
     for tap in 0..TAPS {
         add_turned(&mut sums[tap], [in_phase[tap], quadrature[tap]], chunk.turn);
     }
 }
 
-/// 16 chips of the code from `chip` (at most 1023 + 127) on.
+/// 16 chips of the code from `chip` (at most [`MOST_CHIPS`] + 127) on.
 #[inline]
 #[target_feature(enable = "avx2,fma")]
 fn window(code: &CodeBits, chip: usize) -> __m128i {
-    const { assert!(size_of::<CodeBits>() >= 1023 + 127 + 16) };
+    const { assert!(size_of::<CodeBits>() >= MOST_CHIPS + 127 + 16) };
     // SAFETY: the window lies within `CodeBits`, and the load asks for no alignment.
     unsafe { _mm_loadu_si128(code.as_ptr().add(chip).cast()) }
 }

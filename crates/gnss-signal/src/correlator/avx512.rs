@@ -9,7 +9,7 @@ use super::{
     InstructionSet,
     carrier_table::{CarrierTable, TableAmplitude},
     code_bits::CodeBits,
-    fixed_point::{BLOCK_SAMPLES, Baseband, CODE_PERIOD, Interval, Kernel},
+    fixed_point::{BLOCK_SAMPLES, Baseband, Interval, Kernel, MOST_CHIPS, within_period},
     lane_table::{LaneTable, LaneTables},
 };
 use crate::{MAX_TAPS, SignalError};
@@ -209,7 +209,7 @@ fn add_taps<const TAPS: usize>(
         let (i, q) = (vectors(i), vectors(q));
         for tap in 0..TAPS {
             let phase = now[tap];
-            let chip = (phase >> 32) as usize & 1023;
+            let chip = (phase >> 32) as usize & MOST_CHIPS;
             let row = chunk.lanes.row(phase as u32).as_chunks::<LANES>().0;
             for (vector, (&i, &q)) in i.iter().zip(&q).enumerate() {
                 let window = load(window(chunk.code, chip + origins[vector]));
@@ -217,20 +217,19 @@ fn add_taps<const TAPS: usize>(
                 in_phase[tap] = _mm512_dpbusd_epi32(in_phase[tap], code, i);
                 quadrature[tap] = _mm512_dpbusd_epi32(quadrature[tap], code, q);
             }
-            let next = phase + chunk.step;
-            now[tap] = next.min(next.wrapping_sub(CODE_PERIOD));
+            now[tap] = phase + chunk.step;
         }
     }
-    *phases = now;
+    *phases = now.map(within_period);
     for tap in 0..TAPS {
         add_turned(&mut sums[tap], [in_phase[tap], quadrature[tap]], chunk.turn);
     }
 }
 
-/// The code from `chip` (at most 1023 + 127) on.
+/// The code from `chip` (at most [`MOST_CHIPS`] + 127) on.
 #[inline(always)]
 fn window(code: &CodeBits, chip: usize) -> &[u8; LANES] {
-    const { assert!(size_of::<CodeBits>() >= 1023 + 127 + LANES) };
+    const { assert!(size_of::<CodeBits>() >= MOST_CHIPS + 127 + LANES) };
     // SAFETY: the window lies within `CodeBits`, and bytes are always aligned.
     unsafe { &*code.as_ptr().add(chip).cast() }
 }

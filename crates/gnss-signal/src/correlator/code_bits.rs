@@ -4,11 +4,11 @@ use std::sync::LazyLock;
 
 use crate::{CA_CODE_LENGTH_CHIPS, Signal, SignalId, ranging_code};
 
-/// Chips beyond a period that the kernels may read.
-pub(super) const AHEAD_CHIPS: usize = 256;
+/// Chips beyond a period that the kernels may read: those of a chunk, then a window.
+pub(super) const AHEAD_CHIPS: usize = 1024 + 256;
 
 /// A ranging code, 1 where the chip is +1 and 0 where it is -1, continued into the next period so
-/// that a window from any chip of the first is contiguous.
+/// that windows from all chips of a chunk that begins in the first are contiguous.
 pub(super) type CodeBits = [u8; CA_CODE_LENGTH_CHIPS + 1 + AHEAD_CHIPS];
 
 static CA_CODE_BITS: LazyLock<Vec<CodeBits>> = LazyLock::new(|| {

@@ -26,6 +26,16 @@ const ONE_CHIP: f64 = 4_294_967_296.0;
 /// One code period in fixed point.
 pub(super) const CODE_PERIOD: u64 = (CA_CODE_LENGTH_CHIPS as u64) << 32;
 
+/// A chunk begins within a code period and is shorter than one at every sample rate: its chips have smaller numbers, so
+/// that bits of this mask hold them all.
+pub(super) const MOST_CHIPS: usize = 2047;
+
+/// A phase below two code periods, within the first.
+#[inline(always)]
+pub(super) fn within_period(phase: u64) -> u64 {
+    phase.min(phase.wrapping_sub(CODE_PERIOD))
+}
+
 /// Baseband of one chunk.
 #[derive(Debug, Clone)]
 #[repr(C, align(64))]

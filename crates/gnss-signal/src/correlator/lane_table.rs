@@ -1,5 +1,7 @@
 //! Which chip each sample of a block falls into.
 
+use std::hint::cold_path;
+
 use super::fixed_point::BLOCK_SAMPLES;
 
 /// Step of the code steps for which a table is kept, chips a sample. Half of it over a block is
@@ -8,6 +10,9 @@ const STEP_QUANTUM_CHIPS: f64 = 1.0 / 16_777_216.0;
 
 /// Tables kept: one for each satellite and its recent Doppler.
 const TABLES_KEPT: usize = 32;
+
+/// Ranks that a byte holds.
+const RANKS: usize = 256;
 
 /// Cells of the fractional code phase.
 const CELLS: usize = 512;
@@ -21,9 +26,10 @@ const CELLS: usize = 512;
 /// selects one.
 #[derive(Debug, Clone)]
 pub(super) struct LaneTable {
-    rows: Box<[Row; BLOCK_SAMPLES + 1]>,
+    /// By rank; those past [`BLOCK_SAMPLES`] are there so that no index of a byte lies outside.
+    rows: Box<[Row; RANKS]>,
     /// Fractions of n step in falling order, then zeros.
-    falling: [u32; 2 * BLOCK_SAMPLES],
+    falling: [u32; RANKS],
     cells: [Cell; CELLS],
     /// Chips counted from for each byte of a row.
     origins: [u8; BLOCK_SAMPLES],
@@ -33,17 +39,12 @@ pub(super) struct LaneTable {
 #[repr(C, align(64))]
 struct Row([u8; BLOCK_SAMPLES]);
 
-/// What is known of the rank from the high bits of 2^32 - 1 - f.
-#[derive(Debug, Clone, Copy)]
-#[repr(C, align(8))]
-struct Cell {
-    /// The largest fraction that may or may not be passed, or 0.
-    fraction: u32,
-    /// Fractions certainly passed.
-    rank: u16,
-    /// Whether a second fraction lies in this cell.
-    crowded: bool,
-}
+/// What is known of the rank from the high bits of f: so many fractions certainly carry, of 2^32, and the largest that
+/// may or may not, to which f is added; less [`CROWDED`] where a second one may.
+type Cell = i64;
+
+/// Leaves the rank above the lowest 32 bits as it is.
+const CROWDED: Cell = i64::MIN;
 
 impl LaneTable {
     /// The table for `step_chips` a sample (below 1), with byte k for the sample `order[k]` and its
@@ -57,8 +58,8 @@ impl LaneTable {
         let mut row = Row(std::array::from_fn(|lane| {
             ((fixed(order[lane]) >> 32) - (fixed(origin[lane]) >> 32)) as u8
         }));
-        let mut rows = Box::new([row; BLOCK_SAMPLES + 1]);
-        let mut falling = [0; 2 * BLOCK_SAMPLES];
+        let mut rows = Box::new([row; RANKS]);
+        let mut falling = [0; RANKS];
         for (rank, &(fraction, lane)) in by_fraction.iter().enumerate() {
             falling[rank] = fraction;
             row.0[lane] += 1;
@@ -66,7 +67,7 @@ impl LaneTable {
         }
         Self {
             rows,
-            cells: std::array::from_fn(|cell| Cell::new(cell as u32, &falling)),
+            cells: std::array::from_fn(|number| cell(number as u32, &falling)),
             falling,
             origins: origin.map(|n| (fixed(n) >> 32) as u8),
         }
@@ -75,15 +76,15 @@ impl LaneTable {
     /// Chip numbers for the fractional code phase `fraction` (of 2^32) at the first sample.
     #[inline(always)]
     pub(super) fn row(&self, fraction: u32) -> &[u8; BLOCK_SAMPLES] {
-        let below = !fraction;
-        let cell = self.cells[(below >> 23) as usize];
-        let mut rank = usize::from(cell.rank) + usize::from(cell.fraction > below);
-        if cell.crowded {
-            while self.falling[rank % (2 * BLOCK_SAMPLES)] > below {
+        let sum = self.cells[(fraction >> 23) as usize].wrapping_add(i64::from(fraction));
+        let mut rank = (sum >> 32) as u8;
+        if sum < 0 {
+            cold_path();
+            while fraction.overflowing_add(self.falling[usize::from(rank)]).1 {
                 rank += 1;
             }
         }
-        &self.rows[rank].0
+        &self.rows[usize::from(rank)].0
     }
 
     /// From which chip, counted from that of sample 0, byte `byte` of a row counts.
@@ -96,17 +97,22 @@ impl LaneTable {
     }
 }
 
-impl Cell {
-    fn new(number: u32, falling: &[u32]) -> Self {
-        let smallest = number << 23;
-        let largest = smallest | ((1 << 23) - 1);
-        let passed = |limit: u32| falling.iter().take_while(|&&f| f > limit).count();
-        let rank = passed(largest);
-        Self {
-            fraction: falling[rank],
-            rank: rank as u16,
-            crowded: passed(smallest) > rank + 1,
-        }
+/// The cell of that number.
+fn cell(number: u32, falling: &[u32]) -> Cell {
+    let smallest = number << 23;
+    let largest = smallest | ((1 << 23) - 1);
+    let carry = |f: u32| {
+        falling
+            .iter()
+            .take_while(|&&n| f.overflowing_add(n).1)
+            .count()
+    };
+    let rank = carry(smallest);
+    let known = ((rank as Cell) << 32) + Cell::from(falling[rank]);
+    if carry(largest) > rank + 1 {
+        known + CROWDED
+    } else {
+        known
     }
 }
 
