@@ -4,6 +4,8 @@
 
 use std::collections::HashMap;
 use std::hint::black_box;
+use std::path::Path;
+use std::sync::Arc;
 
 use candle_core::{DType, Device, Tensor};
 use candle_nn::VarBuilder;
@@ -11,6 +13,8 @@ use candle_nn::rnn::{LSTMConfig, RNN, lstm};
 use criterion::{Criterion, criterion_group, criterion_main};
 use fault_ml::learned::lstm::{LstmCell, LstmWeights};
 use fault_ml::learned::svm::SvmPredictor;
+use fault_ml::learned::{ChannelStep, FeatureSet, LearnedModel, LearnedMonitor};
+use fault_ml::{ChannelMonitor, Innovation};
 use linfa::prelude::*;
 use linfa_svm::Svm;
 use ndarray::{Array1, Array2};
@@ -18,7 +22,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 const HIDDEN: usize = 32;
-const INPUTS: usize = 10;
+const INPUTS: usize = FeatureSet::Full.width();
 const STEPS: usize = 50;
 
 fn uniform(count: usize, bound: f32) -> Vec<f32> {
@@ -107,5 +111,49 @@ fn machine(c: &mut Criterion) {
     c.bench_function(&name, |b| b.iter(|| svm.weighted_sum(black_box(&window))));
 }
 
-criterion_group!(benches, layer, machine);
+/// The monitors that come with the receiver, with their features and evidence: a second of signal.
+fn product(c: &mut Criterion) {
+    const CHANNELS: usize = 9;
+    const EPOCHS: usize = 50;
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/models");
+    let mut random = ChaCha8Rng::seed_from_u64(1);
+    let mut step = || {
+        let mut within = |bound: f64| random.random_range(-bound..bound);
+        let innovation = Innovation {
+            code_m: within(8.0),
+            code_sigma_m: 5.0,
+            rate_mps: within(0.08),
+            rate_sigma_mps: 0.05,
+        };
+        ChannelStep {
+            satellite: 7,
+            innovation,
+            given_others: innovation,
+            cn0_dbhz: 42.0 + within(0.2),
+            cn0_now_hz: 10_f64.powf(4.2 + within(0.1)),
+            tap_ratios: Some([0.75 + within(0.03), 0.75 + within(0.03)]),
+        }
+    };
+    let steps: Vec<ChannelStep> = (0..CHANNELS * EPOCHS).map(|_| step()).collect();
+    for name in ["svm", "lstm"] {
+        let weights = std::fs::read(folder.join(format!("{name}.safetensors"))).unwrap();
+        let card = std::fs::read_to_string(folder.join(format!("{name}.json"))).unwrap();
+        let model = Arc::new(LearnedModel::load(&weights, &card).unwrap());
+        let mut monitors = vec![LearnedMonitor::new(model); CHANNELS];
+        c.bench_function(
+            &format!("{name}: {CHANNELS} channels, {EPOCHS} steps each"),
+            |b| {
+                b.iter(|| {
+                    for epoch in steps.chunks(CHANNELS) {
+                        for (monitor, step) in monitors.iter_mut().zip(epoch) {
+                            black_box(monitor.step(step).unwrap());
+                        }
+                    }
+                });
+            },
+        );
+    }
+}
+
+criterion_group!(benches, layer, machine, product);
 criterion_main!(benches);

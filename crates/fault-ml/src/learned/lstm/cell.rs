@@ -1,5 +1,7 @@
 //! One step of the layer, all gates at once, in single precision.
 
+use pulp::{Arch, Simd, WithSimd};
+
 use super::weights::{GATES, LstmWeights};
 use crate::MonitorError;
 use crate::learned::activation::{LANES, sigmoid, tanh};
@@ -22,8 +24,9 @@ pub struct LstmCell {
 #[derive(Debug, Clone, PartialEq)]
 pub struct LstmState {
     hidden: Vec<[f32; LANES]>,
-    next: Vec<[f32; LANES]>,
     cell: Vec<[f32; LANES]>,
+    /// What goes into the gates, in the order of [`Gates`], while a step is worked out.
+    sums: [Vec<[f32; LANES]>; GATES],
 }
 
 impl LstmState {
@@ -69,40 +72,81 @@ impl LstmCell {
         let zeros = vec![[0.0; LANES]; self.blocks.len()];
         LstmState {
             hidden: zeros.clone(),
-            next: zeros.clone(),
-            cell: zeros,
+            cell: zeros.clone(),
+            sums: std::array::from_fn(|_| zeros.clone()),
         }
     }
 
     /// Takes the features of a step and returns the score after it; above zero: faulty.
     pub fn step(&self, state: &mut LstmState, features: &[f32]) -> f32 {
-        let mut score = [0.0; LANES];
-        let states = state.cell.iter_mut().zip(&mut state.next);
-        for ((block, head), (cell, next)) in self.blocks.iter().zip(&self.head).zip(states) {
-            let hidden = state.hidden.as_flattened().iter().take(self.weights.hidden);
-            let [input, forget, candidate, output] = gates(block, features, hidden);
-            for lane in 0..LANES {
-                cell[lane] = sigmoid(forget[lane]) * cell[lane]
-                    + sigmoid(input[lane]) * tanh(candidate[lane]);
-                next[lane] = sigmoid(output[lane]) * tanh(cell[lane]);
-                score[lane] += head[lane] * next[lane];
-            }
-        }
-        std::mem::swap(&mut state.hidden, &mut state.next);
-        self.weights.head_bias + score.iter().sum::<f32>()
+        Arch::new().dispatch(Steps {
+            cell: self,
+            state,
+            features,
+        })
     }
 
     /// The score of a whole window from a state that remembers nothing.
     #[must_use]
     pub fn window(&self, state: &mut LstmState, window: &[f32]) -> f32 {
         state.clear();
-        let steps = window.chunks_exact(self.weights.inputs);
-        steps.fold(0.0, |_, features| self.step(state, features))
+        self.step(state, window)
+    }
+
+    #[inline(always)]
+    fn advance(&self, state: &mut LstmState, features: &[f32]) -> f32 {
+        for (number, block) in self.blocks.iter().enumerate() {
+            let hidden = state.hidden.as_flattened().iter().take(self.weights.hidden);
+            let sums = gates(block, features, hidden);
+            for (all, sums) in state.sums.iter_mut().zip(sums) {
+                all[number] = sums;
+            }
+        }
+        let cell = state.cell.as_flattened_mut();
+        activate(cell, state.hidden.as_flattened_mut(), &state.sums);
+        let mut score = [0.0; LANES];
+        for (head, hidden) in self.head.iter().zip(&state.hidden) {
+            for ((score, weight), unit) in score.iter_mut().zip(head).zip(hidden) {
+                *score += weight * unit;
+            }
+        }
+        self.weights.head_bias + score.iter().sum::<f32>()
+    }
+}
+
+/// Cell and hidden state after a step, from what goes into the gates.
+#[inline(always)]
+fn activate(cell: &mut [f32], hidden: &mut [f32], sums: &[Vec<[f32; LANES]>; GATES]) {
+    let [input, forget, candidate, output] = sums.each_ref().map(|sums| sums.as_flattened());
+    let of_cell = input.iter().zip(forget).zip(candidate);
+    for (cell, ((input, forget), candidate)) in cell.iter_mut().zip(of_cell) {
+        *cell = sigmoid(*forget) * *cell + sigmoid(*input) * tanh(*candidate);
+    }
+    for ((hidden, cell), output) in hidden.iter_mut().zip(cell).zip(output) {
+        *hidden = sigmoid(*output) * tanh(*cell);
+    }
+}
+
+/// A step, or several, compiled for each width of vectors; products and sums are rounded one by one in all, so that
+/// all give the same bits.
+struct Steps<'a> {
+    cell: &'a LstmCell,
+    state: &'a mut LstmState,
+    features: &'a [f32],
+}
+
+impl WithSimd for Steps<'_> {
+    type Output = f32;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> f32 {
+        let steps = self.features.chunks(self.cell.weights.inputs);
+        steps.fold(0.0, |_, features| self.cell.advance(self.state, features))
     }
 }
 
 /// Sums before the activations.
-#[inline]
+#[inline(always)]
 fn gates<'a>(block: &[Gates], features: &'a [f32], hidden: impl Iterator<Item = &'a f32>) -> Gates {
     let mut rows = block.iter();
     let mut sums = rows.next().copied().unwrap_or_default();

@@ -1,5 +1,7 @@
 //! The decision of a trained machine, flat and in single precision.
 
+use pulp::{Arch, Simd, WithSimd};
+
 use crate::MonitorError;
 use crate::error::within;
 use crate::learned::activation::{LANES, exp};
@@ -98,9 +100,27 @@ impl SvmPredictor {
     /// The decision for `window`; coordinates that are missing are those of the support vectors.
     #[must_use]
     pub fn decision(&self, window: &[f32]) -> f32 {
+        let machine = self;
+        Arch::new().dispatch(Decision { machine, window })
+    }
+}
+
+/// A decision, compiled for each width of vectors; products and sums are rounded one by one in all, so that all give the
+/// same bits.
+struct Decision<'a> {
+    machine: &'a SvmPredictor,
+    window: &'a [f32],
+}
+
+impl WithSimd for Decision<'_> {
+    type Output = f32;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> f32 {
+        let Self { machine, window } = self;
         let mut sums = [0.0; LANES];
-        let blocks = self.support.chunks_exact(self.dimensions);
-        for (block, weights) in blocks.zip(&self.weights) {
+        let blocks = machine.support.chunks_exact(machine.dimensions);
+        for (block, weights) in blocks.zip(&machine.weights) {
             let mut squares = [0.0; LANES];
             for (coordinates, x) in block.iter().zip(window) {
                 for (square, coordinate) in squares.iter_mut().zip(coordinates) {
@@ -109,10 +129,10 @@ impl SvmPredictor {
                 }
             }
             for ((sum, square), weight) in sums.iter_mut().zip(squares).zip(weights) {
-                *sum += weight * exp(-self.gamma * square);
+                *sum += weight * exp(-machine.gamma * square);
             }
         }
-        self.bias + sums.iter().sum::<f32>()
+        machine.bias + sums.iter().sum::<f32>()
     }
 }
 
