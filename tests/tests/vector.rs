@@ -62,6 +62,23 @@ fn the_frequency_discriminator_alone_follows_it_too() {
 }
 
 /// Whether an epoch is a fix whose horizontal error is below 10 m.
+#[test]
+fn the_filter_waits_as_long_as_it_is_told_to() {
+    let overrides = ["duration_s=12", "receiver={assisted=true}"];
+    let scenario = scenario("static-open-sky", &overrides, None);
+    let mut settings = vector(&scenario);
+    let taken_over_s = |settings: &Settings| {
+        let judged = receive(&scenario, Level::Correlator, settings).unwrap();
+        let to = LoopMembership::Vector;
+        happened(&judged, 0.0, |k| *k == EventKind::ModeSwitched { to }).unwrap()
+    };
+    assert!(taken_over_s(&settings) < 2.0);
+    settings.vector.as_mut().unwrap().from_s = 10.0;
+    let after_s = taken_over_s(&settings);
+    // Three fixes, ten a second.
+    assert!((10.0..10.5).contains(&after_s), "{after_s}");
+}
+
 fn is_good(epoch: &JudgedEpoch) -> bool {
     epoch.pvt.status == Status::Fix && epoch.horizontal_m() < 10.0
 }

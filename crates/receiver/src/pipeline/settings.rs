@@ -51,6 +51,13 @@ pub struct Settings {
     pub vector: Option<VectorSettings>,
 }
 
+impl Settings {
+    /// Settings of the filter where it may take over after `time_s` of signal.
+    pub(super) fn filter_at(&self, time_s: f64) -> Option<&VectorSettings> {
+        self.vector.as_ref().filter(|v| time_s >= v.from_s)
+    }
+}
+
 /// How the shape of correlations is watched.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ShapeWatching {

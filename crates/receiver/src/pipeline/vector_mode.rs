@@ -26,7 +26,8 @@ impl<B: CorrelatorBank> Run<'_, B> {
         now: u64,
         navigated: &Navigated,
     ) -> Result<(), ReceiverError> {
-        let Some(settings) = &self.settings.vector else {
+        let time_s = self.time_s(now);
+        let Some(settings) = self.settings.filter_at(time_s) else {
             return Ok(());
         };
         let exact = self.navigator.receive_time(now).is_some();
@@ -53,7 +54,8 @@ impl<B: CorrelatorBank> Run<'_, B> {
 
     /// Begins vector tracking before any bit boundary is known, by a snapshot that agrees with itself.
     pub(super) fn consider_early_tracking(&mut self, now: u64) -> Result<(), ReceiverError> {
-        let Some(settings) = &self.settings.vector else {
+        let time_s = self.time_s(now);
+        let Some(settings) = self.settings.filter_at(time_s) else {
             return Ok(());
         };
         let waits = self.vector.is_none() && self.navigator.coarse_time(now).is_some();

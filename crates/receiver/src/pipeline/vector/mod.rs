@@ -10,6 +10,7 @@ mod filter;
 mod hindsight;
 mod judge;
 mod monitors;
+mod rate_gate;
 mod report;
 mod restart;
 mod scatter;
@@ -23,7 +24,7 @@ use std::collections::BTreeMap;
 use fault_ml::learned::ChannelStep;
 use gnss_nav::coarse_time::SnapshotSolution;
 use gnss_nav::filter::{
-    Advice, Disposition, EpochGeometry, FaultLogic, FaultThresholds, Innovations, NavFilter,
+    Advice, Disposition, EpochGeometry, FaultLogic, FaultThresholds, Gate, Innovations, NavFilter,
     Observable, SatelliteInnovation, SkipReason, Update,
 };
 use gnss_nav::measurement::form;
@@ -392,6 +393,10 @@ impl VectorTracking {
             .iter()
             .filter_map(|m| Some((m.satellite, m.shown?)));
         now.shown = shown.collect();
+        let gated = self.settings.gate != Gate::Off;
+        if gated && rate_gate::close(&mut now.measurements, &now.shown) {
+            innovations = self.filter.innovations(&now.measurements)?;
+        }
         now.told = self.believe(&innovations, epoch);
         if let Some(again) = self.take_back(&mut now)? {
             innovations = again;

@@ -51,7 +51,7 @@ impl Monitor {
 }
 
 /// A deviation from what the others say, beyond which a satellite is not one of the others, in deviations.
-const CONTRADICTS_SIGMAS: f64 = 6.0;
+pub(super) const CONTRADICTS_SIGMAS: f64 = 6.0;
 /// Satellites that tell what to expect of another one, at least.
 const FEWEST_OTHERS: usize = 5;
 

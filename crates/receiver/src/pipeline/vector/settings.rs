@@ -58,6 +58,8 @@ pub enum Policy {
 pub struct VectorSettings {
     /// Filter. Default: sequential.
     pub filter: FilterKind,
+    /// Signal that channels follow by their own loops at least, before the filter takes over, s. Default 0.
+    pub from_s: f64,
     /// Time between two updates of the filter, s. Default 0.02: a data bit.
     pub interval_s: f64,
     /// How receiver and clock may move beside the acceleration that the filter has seen in the last
@@ -95,6 +97,12 @@ impl VectorSettings {
             let given = self.interval_s;
             return Err(ReceiverError::Option {
                 what: format!("the filter's interval is {given} s: expected above 0 and at most 1"),
+            });
+        }
+        if !(self.from_s >= 0.0 && self.from_s.is_finite()) {
+            let given = self.from_s;
+            return Err(ReceiverError::Option {
+                what: format!("the filter takes over from {given} s on: expected 0 or more"),
             });
         }
         if !(0.0..=LONGEST_HINDSIGHT_S).contains(&self.hindsight_s) {
@@ -144,6 +152,7 @@ impl Default for VectorSettings {
         let interval_s = 0.02;
         Self {
             filter: FilterKind::Sequential,
+            from_s: 0.0,
             interval_s,
             process_noise: ProcessNoise::default(),
             gate: Gate::Sigmas(4.0),
@@ -183,6 +192,14 @@ mod tests {
         };
         let text = settings.monitors().unwrap_err().to_string();
         assert!(text.starts_with("the filter's interval is NaN s"), "{text}");
+        for from_s in [-1.0, f64::INFINITY, f64::NAN] {
+            let settings = VectorSettings {
+                from_s,
+                ..VectorSettings::default()
+            };
+            let text = settings.monitors().unwrap_err().to_string();
+            assert!(text.starts_with("the filter takes over from"), "{text}");
+        }
         for hindsight_s in [-1.0, 61.0, f64::NAN] {
             let settings = VectorSettings {
                 hindsight_s,
