@@ -114,6 +114,18 @@ pub const STATIC: Recording = recording(
     "0",
 );
 
+/// Options with which every channel of vector tracking is watched by all there is.
+pub const EVERY_MONITOR: [&str; 8] = [
+    "--monitor",
+    "innovation",
+    "--monitor",
+    "svm",
+    "--monitor",
+    "lstm",
+    "--monitor",
+    "ewma",
+];
+
 /// What a run of the receiver left behind.
 pub struct Run {
     /// What it printed.

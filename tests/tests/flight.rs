@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use end_to_end_tests::{FLIGHT, number, receive, test_data};
+use end_to_end_tests::{EVERY_MONITOR, FLIGHT, number, receive, test_data};
 
 /// Documented position, ECEF m, and velocity, m/s.
 const POSITION: [f64; 3] = [3_839_479.7, 721_777.3, 5_025_349.9];
@@ -64,7 +64,7 @@ fn vector_tracking_begins_with_the_first_fix_and_keeps_every_channel() {
     let vector = receive(
         &data,
         &FLIGHT,
-        &[&options[..], &["--mode", "vector"]].concat(),
+        &[&options[..], &["--mode", "vector"], &EVERY_MONITOR].concat(),
     );
     let (before, after) = (snapshot.rows("pvt.csv"), vector.rows("pvt.csv"));
     let fix = after.last().unwrap();

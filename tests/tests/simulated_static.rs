@@ -4,7 +4,7 @@
 use std::path::Path;
 use std::process::Command;
 
-use end_to_end_tests::{Run, STATIC, announce_skip, number, receive, test_data};
+use end_to_end_tests::{EVERY_MONITOR, Run, STATIC, announce_skip, number, receive, test_data};
 use gnss_nav::{Ephemeris, Geodetic};
 use nalgebra::Vector3;
 
@@ -162,6 +162,23 @@ fn assisted_it_fixes_within_a_second() {
     assert!(summary["first_fix_s"].as_f64().unwrap() <= 1.0);
     // Code smoothing has just begun: metres at first (the truth is judged over all epochs).
     assert!(summary["error"]["horizontal_rms_m"].as_f64().unwrap() < 3.0);
+}
+
+#[test]
+fn no_monitor_excludes_a_healthy_channel() {
+    let Some(data) = test_data() else { return };
+    let signal = ["--mode", "vector", "--troposphere", "none"];
+    let run = receive(&data, &STATIC, &[&signal[..], &EVERY_MONITOR].concat());
+    let channels = run.rows("channels.csv");
+    let mut judged = [0; 4];
+    for channel in channels.iter().filter(|c| c["loop"] == "vector") {
+        assert_eq!(channel["disposition"], "use", "{channel:?}");
+        for (count, name) in judged.iter_mut().zip(["innovation", "svm", "lstm", "ewma"]) {
+            *count += usize::from(!channel[&format!("score_{name}")].is_empty());
+        }
+    }
+    // Nine channels for 60 s at least, ten times a second.
+    assert!(judged.iter().all(|count| *count > 5400), "{judged:?}");
 }
 
 #[test]
