@@ -163,7 +163,7 @@ enum Validation {
         /// Also write thresholds and figures into the models' cards
         #[arg(long)]
         write: bool,
-        /// Folder of Stanford plots and all figures
+        /// Folder of ROC, delays, Stanford plots and all figures
         #[arg(long, value_name = "DIR", default_value = "target/monitors")]
         out: PathBuf,
     },

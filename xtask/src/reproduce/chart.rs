@@ -9,6 +9,8 @@ const HEIGHT: u32 = 340;
 /// Height of the title, px.
 const TITLE: u32 = 34;
 
+/// Black: what is given.
+pub const BLACK: RGBColor = RGBColor(0, 0, 0);
 /// Red: what fails, or is compared against.
 pub const RED: RGBColor = RGBColor(200, 30, 30);
 /// Blue: what is proposed.
@@ -40,6 +42,17 @@ pub struct Series {
     pub points: Vec<(f64, f64)>,
 }
 
+/// How far a value may be off, across its point.
+#[derive(Debug, Clone, Copy)]
+pub struct Bar {
+    /// Where it stands.
+    pub x: f64,
+    /// Its lower and its upper end.
+    pub ends: (f64, f64),
+    /// Colour.
+    pub colour: RGBColor,
+}
+
 /// One chart.
 #[derive(Debug, Clone, Default)]
 pub struct Chart {
@@ -55,6 +68,10 @@ pub struct Chart {
     pub marked: Vec<f64>,
     /// Stretches of x over which something lasts, first and last.
     pub shaded: Vec<(f64, f64)>,
+    /// How far values may be off.
+    pub bars: Vec<Bar>,
+    /// The largest value there can be: the axis ends with it, and names stand in the lower right corner.
+    pub ceiling: Option<f64>,
 }
 
 /// What drawing returns.
@@ -93,10 +110,15 @@ fn draw(title: &str, charts: &[Chart]) -> Drawn<String> {
 
 fn draw_chart(area: &Area<'_>, chart: &Chart) -> Drawn<()> {
     let points = || chart.series.iter().flat_map(|s| &s.points);
-    let (x, y) = (range(points().map(|p| p.0)), range(points().map(|p| p.1)));
+    let bars = chart.bars.iter().flat_map(|bar| [bar.ends.0, bar.ends.1]);
+    let (x, y) = (
+        range(points().map(|p| p.0)),
+        range(points().map(|p| p.1).chain(bars)),
+    );
     // The names of the series stand above the lines.
     let span = y.1 - y.0;
-    let across = (y.0 - 0.06 * span)..(y.1 + 0.35 * span);
+    let end = chart.ceiling.unwrap_or(y.1 + 0.35 * span);
+    let across = (y.0 - 0.06 * span)..end;
     let mut drawing = ChartBuilder::on(area)
         .caption(&chart.caption, ("sans-serif", 15))
         .margin(10)
@@ -125,7 +147,23 @@ fn draw_chart(area: &Area<'_>, chart: &Chart) -> Drawn<()> {
     for series in &chart.series {
         draw_series(&mut drawing, series)?;
     }
-    legend(&mut drawing)
+    for bar in &chart.bars {
+        draw_bar(&mut drawing, bar, 0.004 * (x.1 - x.0))?;
+    }
+    let corner = match chart.ceiling {
+        Some(_) => SeriesLabelPosition::LowerRight,
+        None => SeriesLabelPosition::UpperLeft,
+    };
+    legend(&mut drawing, corner)
+}
+
+/// `bar` with a cross-line, `half` as far to each side, at its ends.
+fn draw_bar(drawing: &mut Drawing<'_, '_>, bar: &Bar, half: f64) -> Drawn<()> {
+    let (low, high) = bar.ends;
+    let across = |y| vec![(bar.x - half, y), (bar.x + half, y)];
+    let lines = [vec![(bar.x, low), (bar.x, high)], across(low), across(high)];
+    drawing.draw_series(lines.map(|line| PathElement::new(line, bar.colour)))?;
+    Ok(())
 }
 
 fn draw_series(drawing: &mut Drawing<'_, '_>, series: &Series) -> Drawn<()> {
@@ -143,11 +181,14 @@ fn draw_series(drawing: &mut Drawing<'_, '_>, series: &Series) -> Drawn<()> {
     Ok(())
 }
 
-/// The names of the series in the upper left corner.
-pub(super) fn legend<'a, 'b: 'a>(drawing: &mut Drawing<'a, 'b>) -> Drawn<()> {
+/// The names of the series in a corner.
+pub(super) fn legend<'a, 'b: 'a>(
+    drawing: &mut Drawing<'a, 'b>,
+    corner: SeriesLabelPosition,
+) -> Drawn<()> {
     drawing
         .configure_series_labels()
-        .position(SeriesLabelPosition::UpperLeft)
+        .position(corner)
         .background_style(WHITE.mix(0.85))
         .border_style(BLACK.mix(0.2))
         .label_font(("sans-serif", 13))
@@ -200,6 +241,7 @@ mod tests {
             }],
             marked: vec![0.5],
             shaded: vec![(0.2, 0.4)],
+            ..Chart::default()
         };
         let dots = |series: &Series| Series {
             stroke: Stroke::Dots,
@@ -214,6 +256,35 @@ mod tests {
         for text in ["Figure 1", "Error", "time (s)", "error (m)", "ours"] {
             assert!(svg.contains(text), "{text}");
         }
+    }
+
+    #[test]
+    fn no_axis_goes_beyond_what_can_be_and_bars_stand_on_their_points() {
+        let chart = |bars| Chart {
+            series: vec![Series {
+                label: "part".to_owned(),
+                colour: BLUE,
+                stroke: Stroke::Line,
+                points: vec![(0.0, 80.0), (1.0, 99.0)],
+            }],
+            bars,
+            ceiling: Some(100.0),
+            ..Chart::default()
+        };
+        let bar = Bar {
+            x: 0.0,
+            ends: (70.0, 90.0),
+            colour: BLUE,
+        };
+        let plain = picture("Figure 1", &[chart(Vec::new())]).unwrap();
+        let barred = picture("Figure 1", &[chart(vec![bar])]).unwrap();
+        for svg in [&plain, &barred] {
+            assert!(svg.contains("\n100\n") && !svg.contains("\n102\n"), "{svg}");
+        }
+        let blue = |svg: &str| svg.matches("#1E5AB4").count();
+        assert_eq!(blue(&barred) - blue(&plain), 3);
+        // The axis begins below the bar.
+        assert!(barred.contains("\n70\n") && !plain.contains("\n70\n"));
     }
 
     #[test]

@@ -16,6 +16,9 @@ const EXAMINED: usize = 20_000;
 /// Draws of the bootstrap.
 const ROUNDS: usize = 200;
 
+/// Places at which a ROC is drawn: false alarms of 0 to 1.
+const DRAWN: usize = 51;
+
 /// A decision on a window.
 #[derive(Debug, Clone, Copy)]
 struct Decision {
@@ -46,10 +49,26 @@ impl OnFault {
     /// Median time to the alarm, those never found counting as endless, s.
     #[must_use]
     pub fn median_delay_s(&self) -> f64 {
+        self.delay_s(0.5)
+    }
+
+    /// Time by which that part of the faults has alarmed, s.
+    fn delay_s(&self, part: f64) -> f64 {
         let mut delays = self.delays_s.clone();
         delays.resize(self.faults, f64::INFINITY);
-        quantile(delays, 0.5)
+        quantile(delays, part)
     }
+}
+
+/// Detections at one rate of false alarms.
+#[derive(Debug, Clone, Copy)]
+pub struct RocBand {
+    /// Part of the healthy windows above the threshold.
+    pub false_alarms: f64,
+    /// Part of the faulty ones.
+    pub detections: f64,
+    /// Lower and upper end of that, over scenarios.
+    pub band: (f64, f64),
 }
 
 /// The figures of one monitor.
@@ -61,6 +80,8 @@ pub struct Examination {
     pub area: f64,
     /// Lower and upper end of the band.
     pub area_band: (f64, f64),
+    /// The ROC and its band over scenarios.
+    pub roc: Vec<RocBand>,
     /// Area of each fault against all healthy windows.
     pub area_by_fault: BTreeMap<String, f64>,
     /// Largest balanced accuracy of any threshold on the validation scenarios, applied to the test.
@@ -121,11 +142,20 @@ pub fn examine(
             .push((d.score, d.faulty));
     }
     let groups: Vec<_> = by_scenario.into_values().collect();
-    let band = Roc::area_band(&groups, ROUNDS, &mut ChaCha8Rng::seed_from_u64(1));
+    let (area_band, roc_bands) = bands(&groups);
+    let roc = Roc::new(&plain);
+    let at = |(k, band)| RocBand {
+        false_alarms: false_alarms(k),
+        detections: roc
+            .as_ref()
+            .map_or(f64::NAN, |roc| roc.detections_at(false_alarms(k))),
+        band,
+    };
     Ok(Examination {
         name: name.to_owned(),
-        area: Roc::new(&plain).map_or(f64::NAN, |roc| roc.area()),
-        area_band: band.unwrap_or((f64::NAN, f64::NAN)),
+        area: roc.as_ref().map_or(f64::NAN, Roc::area),
+        area_band,
+        roc: roc_bands.into_iter().enumerate().map(at).collect(),
         area_by_fault: area_by_fault(test, &scores, window),
         balanced: accuracy(&|_| true),
         balanced_steady: accuracy(&|d| !d.new),
@@ -136,6 +166,25 @@ pub fn examine(
         threshold,
         faults: on_faults(examined.unwatched, &alarms, threshold),
     })
+}
+
+/// False alarms at place `k` of a drawn ROC.
+fn false_alarms(k: usize) -> f64 {
+    k as f64 / (DRAWN - 1) as f64
+}
+
+/// Bands of the area and of the detections at each place, over groups that hang together.
+fn bands(groups: &[Vec<(f64, bool)>]) -> ((f64, f64), [(f64, f64); DRAWN]) {
+    let mut random = ChaCha8Rng::seed_from_u64(1);
+    let unknown = (f64::NAN, f64::NAN);
+    let area = Roc::bands(groups, ROUNDS, &mut random, |roc| [roc.area()]);
+    let mut random = ChaCha8Rng::seed_from_u64(1);
+    let detections = |roc: &Roc| std::array::from_fn(|k| roc.detections_at(false_alarms(k)));
+    let detections = Roc::bands(groups, ROUNDS, &mut random, detections);
+    (
+        area.map_or(unknown, |[area]| area),
+        detections.unwrap_or([unknown; DRAWN]),
+    )
 }
 
 fn decisions(data: &Dataset, scores: &[Vec<Option<f64>>], window: usize) -> Vec<Decision> {
@@ -245,10 +294,10 @@ impl Examination {
             .iter()
             .map(|(fault, on)| {
                 let share = on.detected();
-                let delay = Some(on.median_delay_s()).filter(|d| d.is_finite());
+                let delay = |part| Some(on.delay_s(part)).filter(|d| d.is_finite());
                 let value = json!({
                     "faults": on.faults, "detected": share.value, "detected_95": [share.low, share.high],
-                    "median_delay_s": delay, "area": self.area_by_fault.get(fault),
+                    "median_delay_s": delay(0.5), "quartile_delays_s": [delay(0.25), delay(0.75)], "area": self.area_by_fault.get(fault),
                 });
                 (fault.clone(), value)
             })

@@ -69,35 +69,43 @@ impl Roc {
     /// Detections at the lowest threshold with at most so many false alarms.
     #[must_use]
     pub fn detections_at(&self, false_alarms: f64) -> f64 {
-        let mut allowed = self
+        let allowed = self
             .points
-            .iter()
-            .filter(|p| p.false_alarms <= false_alarms);
-        allowed.next_back().map_or(0.0, |p| p.detections)
+            .partition_point(|p| p.false_alarms <= false_alarms);
+        let last = allowed.checked_sub(1).and_then(|k| self.points.get(k));
+        last.map_or(0.0, |p| p.detections)
     }
 
-    /// 2.5 and 97.5 % of the area over `rounds` draws of whole groups with replacement: steps of one
-    /// scenario hang together, so that they are drawn together. `None` where a kind is missing.
-    pub fn area_band(
+    /// 2.5 and 97.5 % of each of `values` of the curve over `rounds` draws of whole groups with replacement: steps of
+    /// one scenario hang together, so that they are drawn together. `None` where a kind is missing.
+    pub fn bands<const N: usize>(
         groups: &[Vec<(f64, bool)>],
         rounds: usize,
         random: &mut impl Rng,
-    ) -> Option<(f64, f64)> {
-        let mut areas = Vec::with_capacity(rounds);
+        values: impl Fn(&Self) -> [f64; N],
+    ) -> Option<[(f64, f64); N]> {
+        let mut drawn_values = [const { Vec::new() }; N];
         for _ in 0..rounds {
             let drawn: Vec<(f64, bool)> = (0..groups.len())
                 .filter_map(|_| groups.get(random.random_range(0..groups.len())))
                 .flatten()
                 .copied()
                 .collect();
-            areas.extend(Self::new(&drawn).map(|roc| roc.area()));
+            let Some(roc) = Self::new(&drawn) else {
+                continue;
+            };
+            for (all, value) in drawn_values.iter_mut().zip(values(&roc)) {
+                all.push(value);
+            }
         }
-        areas.sort_by(f64::total_cmp);
-        let at = |share: f64| {
-            let index = (share * areas.len().saturating_sub(1) as f64).round() as usize;
-            areas.get(index).copied()
-        };
-        Some((at(0.025)?, at(0.975)?))
+        if drawn_values.iter().any(Vec::is_empty) {
+            return None;
+        }
+        Some(drawn_values.map(|mut all| {
+            all.sort_by(f64::total_cmp);
+            let at = |share: f64| all[(share * (all.len() - 1) as f64).round() as usize];
+            (at(0.025), at(0.975))
+        }))
     }
 }
 
@@ -144,8 +152,12 @@ mod tests {
         let group = |g: usize| scores.iter().skip(g).step_by(10).copied().collect();
         let groups: Vec<Vec<_>> = (0..10).map(group).collect();
         let mut random = ChaCha8Rng::seed_from_u64(1);
-        let (low, high) = Roc::area_band(&groups, 200, &mut random).unwrap();
-        assert!(low < roc.area() && roc.area() < high && high - low < 0.5);
+        let values = |roc: &Roc| [roc.area(), roc.detections_at(0.5)];
+        let bands = Roc::bands(&groups, 200, &mut random, values).unwrap();
+        for ((low, high), value) in bands.into_iter().zip(values(&roc)) {
+            assert!(low < value && value < high && high - low < 0.5);
+        }
+        assert!(Roc::bands(&[], 200, &mut random, values).is_none());
         assert!(Roc::new(&[(1.0, true)]).is_none());
     }
 }

@@ -157,7 +157,7 @@ fn draw_ratios(area: &Area, swarm: &Trace) -> Drawn<()> {
         ))?
         .label("faulty satellite left out")
         .legend(|(x, y)| PathElement::new([(x, y), (x + 18, y)], FAULTY.stroke_width(2)));
-    legend(&mut chart)
+    legend(&mut chart, SeriesLabelPosition::UpperLeft)
 }
 
 fn draw_decisions(area: &Area, swarm: &Trace, bootstrap: &Trace) -> Drawn<()> {
@@ -180,5 +180,5 @@ fn draw_decisions(area: &Area, swarm: &Trace, bootstrap: &Trace) -> Drawn<()> {
             .label(name)
             .legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], colour.stroke_width(2)));
     }
-    legend(&mut chart)
+    legend(&mut chart, SeriesLabelPosition::UpperLeft)
 }

@@ -15,6 +15,8 @@ use crate::scenario::catalogue;
 use crate::scenario::make::Level;
 use crate::train::paper::{self, Accuracy, Lessons};
 
+/// Scalar tracking before the filter takes over, s.
+pub const SCALAR_S: f64 = 60.0;
 /// When the satellite is switched off, s, and which.
 pub const OFF_S: f64 = 80.0;
 const OFF_PRN: u8 = 17;
@@ -134,6 +136,7 @@ fn settings(scenario: &Scenario, model: Option<LearnedModel>) -> Settings {
         Policy::Observe
     };
     let vector = base.vector.map(|vector| VectorSettings {
+        from_s: SCALAR_S,
         monitor: None,
         learned: model.into_iter().map(Arc::new).collect(),
         policy,

@@ -14,7 +14,7 @@ use serde_json::{Value, json};
 
 use crate::judged;
 use crate::order::quantile;
-use crate::reproduce::chart::{BLUE, Chart, GREEN, RED, Series, Stroke, picture};
+use crate::reproduce::chart::{BLACK, BLUE, Chart, GREEN, RED, Series, Stroke, picture};
 use crate::scenario::built::Scenario;
 use crate::scenario::make::Level;
 use crate::train::evaluate::OnFault;
@@ -241,9 +241,14 @@ pub fn stanford(consequences: &[Consequence]) -> Result<String> {
                 series("nobody left out", BLUE, &|e| !e.alarmed && !e.misleads()),
                 series("a satellite left out", GREEN, &|e| e.alarmed),
                 series("misleading", RED, &Epoch::misleads),
+                Series {
+                    label: "as stated".to_owned(),
+                    colour: BLACK,
+                    stroke: Stroke::Line,
+                    points: vec![(0.0, 0.0), (DRAWN_M, DRAWN_M)],
+                },
             ],
-            marked: Vec::new(),
-            shaded: Vec::new(),
+            ..Chart::default()
         }
     };
     let charts: Vec<Chart> = consequences.iter().map(chart).collect();

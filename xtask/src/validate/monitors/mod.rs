@@ -1,6 +1,7 @@
 //! What the monitors of a channel find and what they cry wolf at, all at the same rate of false alarms.
 
 pub mod consequence;
+mod curves;
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -64,12 +65,20 @@ pub struct Table {
     pub rows: Vec<Row>,
     /// What faults do to the position, by who watches.
     pub consequences: Vec<Consequence>,
+    /// The threshold that theory gives the innovation test, and its false alarms there.
+    by_theory: (f64, RateInterval),
     scenarios: u32,
 }
 
-fn subjects(models: &Path) -> Result<Vec<Subject>> {
+/// The innovation test as the receiver has it.
+fn innovation_test() -> Result<InnovationTest> {
     let settings = VectorSettings::default().monitor;
-    let test = InnovationTest::new(settings.context("no innovation test")?)?;
+    Ok(InnovationTest::new(
+        settings.context("no innovation test")?,
+    )?)
+}
+
+fn subjects(models: &Path, test: InnovationTest) -> Result<Vec<Subject>> {
     let mut subjects = vec![Subject {
         name: "innovation",
         examinee: Examinee::Innovation(test),
@@ -93,7 +102,9 @@ fn subjects(models: &Path) -> Result<Vec<Subject>> {
 /// # Errors
 /// Where a model cannot be read or a run fails.
 pub fn table(models: &Path, channel_hours: f64, scenarios: u32) -> Result<Table> {
-    let subjects = subjects(models)?;
+    let test = innovation_test()?;
+    let theory = test.threshold();
+    let subjects = subjects(models, test)?;
     let examinees: Vec<Examinee> = subjects.iter().map(|s| s.examinee.clone()).collect();
     let found_in = quiet::runs(FOUND_BY_SHARE * channel_hours);
     let counted_in = found_in..found_in + quiet::runs(channel_hours);
@@ -108,6 +119,8 @@ pub fn table(models: &Path, channel_hours: f64, scenarios: u32) -> Result<Table>
         watched: &watched,
         unwatched: &unwatched,
     };
+    let tested = counted_by.first().context("nothing was counted")?;
+    let by_theory = (theory, tested.rate(theory));
     let mut rows = Vec::new();
     for ((subject, found), counted) in subjects.into_iter().zip(found_by).zip(counted_by) {
         let point = found.operating_point(FALSE_ALARMS_PER_HOUR)?;
@@ -132,6 +145,7 @@ pub fn table(models: &Path, channel_hours: f64, scenarios: u32) -> Result<Table>
     Ok(Table {
         rows,
         consequences,
+        by_theory,
         scenarios,
     })
 }
@@ -182,7 +196,7 @@ impl Table {
         Ok(())
     }
 
-    /// Writes the Stanford plots and all figures into `folder`.
+    /// Writes ROC, delays, Stanford plots and all figures into `folder`.
     ///
     /// # Errors
     /// Names the file that cannot be written.
@@ -200,6 +214,8 @@ impl Table {
             .collect();
         let figures = json!({ "monitors": monitors, "flown": flown });
         for (name, text) in [
+            ("roc.svg", curves::roc(&self.rows)?),
+            ("delays.svg", curves::delays(&self.rows)?),
             ("stanford.svg", stanford(&self.consequences)?),
             ("monitors.json", format!("{figures:#}\n")),
         ] {
@@ -268,6 +284,12 @@ impl fmt::Display for Table {
                 e.balanced_steady.value()
             )?;
         }
+        let (threshold, alarms) = &self.by_theory;
+        writeln!(
+            f,
+            "\nthe innovation test at the threshold of theory, {threshold:.2}: {} in {:.0} h: {:.4} ({:.4} to {:.4})",
+            alarms.events, alarms.hours, alarms.per_hour, alarms.low, alarms.high
+        )?;
         write!(f, "\n| fault |")?;
         for row in &self.rows {
             write!(
