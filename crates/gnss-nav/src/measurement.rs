@@ -4,6 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::atmosphere::{Klobuchar, saastamoinen_delay_m};
 use crate::constants::SPEED_OF_LIGHT_MPS;
+use crate::delay_rate::{self, DelayRate};
 use crate::geodesy::{Geodetic, Look};
 use crate::line_of_sight::LineOfSight;
 use crate::{EphemerisStore, GpsTime, NavError, SatelliteId, SatelliteState};
@@ -138,8 +139,8 @@ pub struct ErrorModel {
     pub multipath_zenith_m: f64,
 }
 
-/// Elevation below which [`ErrorModel::multipath_zenith_m`] grows no more, rad: 3 degrees.
-const LOWEST_ELEVATION_RAD: f64 = 0.05;
+/// Elevation below which what goes with its inverse sine grows no more, rad: 3 degrees.
+pub(crate) const LOWEST_ELEVATION_RAD: f64 = 0.05;
 
 impl ErrorModel {
     /// Tracking noise alone: for signals simulated with exactly the modelled delays.
@@ -208,7 +209,10 @@ pub struct Predicted {
     pub delay_m: f64,
     /// Variance left by the modelled delays, m^2.
     pub delay_variance_m2: f64,
-    /// Variance of a range rate whose prediction leaves out how the delays change, (m/s)^2.
+    /// How the modelled delay of the troposphere changes; that of the ionosphere does by millimetres a second, which are
+    /// left out.
+    pub delay_rate: DelayRate,
+    /// Variance of that, (m/s)^2.
     pub delay_rate_variance_m2_s2: f64,
     /// Geometry.
     pub line_of_sight: LineOfSight,
@@ -269,18 +273,6 @@ impl MeasurementModel {
     }
 }
 
-/// How fast a tropospheric delay changes at most, m/s: 1 cm/s at 10 degrees, 4 cm/s at 5, without end
-/// at the horizon.
-fn troposphere_rate_mps(delay_m: f64, elevation_rad: f64) -> f64 {
-    /// Fastest rise of a satellite seen from the ground, rad/s.
-    const RISE_RAD_S: f64 = 1.4e-4;
-    if delay_m == 0.0 {
-        return 0.0;
-    }
-    // Delays go with 1 / sin.
-    RISE_RAD_S * delay_m / elevation_rad.tan()
-}
-
 /// A measurement model at one place and time.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ModelAt<'a> {
@@ -312,7 +304,13 @@ impl ModelAt<'_> {
             delay_m,
             delay_variance_m2: (errors.ionosphere_fraction * ionosphere_m).powi(2)
                 + errors.troposphere_variance_m2(troposphere_m, look.elevation_rad),
-            delay_rate_variance_m2_s2: troposphere_rate_mps(troposphere_m, look.elevation_rad)
+            delay_rate: DelayRate::new(
+                troposphere_m,
+                &line_of_sight,
+                &self.receiver_ecef_m,
+                &self.enu_from_ecef.row(2).transpose(),
+            ),
+            delay_rate_variance_m2_s2: delay_rate::error_mps(troposphere_m, look.elevation_rad)
                 .powi(2),
             line_of_sight,
             look,

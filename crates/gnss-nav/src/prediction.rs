@@ -86,8 +86,7 @@ pub fn predict(ephemeris: &Ephemeris, receiver: &ReceiverState) -> Result<Expect
 /// What a receiver expects of the satellite of `ephemeris` through the delays of `model`.
 ///
 /// The delays hold back the code; that the satellite stands elsewhere by its range rate times the
-/// delay is left out (0.1 mm for 30 m). Their own rates are left out: millimetres a second, except the
-/// troposphere of low satellites, 8 mm/s at 10 degrees and 3 cm/s at 5 as they rise or set.
+/// delay is left out (0.1 mm for 30 m), and so is the rate of the ionosphere's, millimetres a second.
 ///
 /// # Errors
 /// As [`predict`].
@@ -111,6 +110,7 @@ pub fn predict_from(
     let predicted = model.predict(state, &receiver.position_ecef_m, receiver.time);
     let line_of_sight = predicted.line_of_sight;
     let range_rate_mps = line_of_sight.range_rate_mps(&receiver.velocity_ecef_mps)
+        + predicted.delay_rate.mps(&receiver.velocity_ecef_mps)
         + receiver.clock_drift_mps
         - SPEED_OF_LIGHT_MPS * state.clock_drift;
     let travel_m = line_of_sight.range_m + predicted.delay_m;
@@ -238,7 +238,7 @@ mod tests {
     }
 
     #[test]
-    fn the_air_holds_back_the_code_and_nothing_else() {
+    fn the_air_holds_back_the_code() {
         let empty = expected(0.0, &MeasurementModel::geometry_only());
         for (air, none) in expected(0.0, &through_air()).iter().zip(&empty) {
             assert!((2.0..60.0).contains(&air.delay_m), "{}", air.delay_m);
@@ -246,7 +246,44 @@ mod tests {
             let later_s = none.transmit_time - air.transmit_time;
             // A time of the fraction of a second rounds to 1e-16 s.
             assert!((later_s * SPEED_OF_LIGHT_MPS - air.delay_m).abs() < 1e-6);
-            assert_eq!(air.doppler_hz, none.doppler_hz);
         }
+    }
+
+    #[test]
+    fn range_rates_hold_how_the_delay_of_the_troposphere_changes() {
+        let model = MeasurementModel {
+            troposphere: true,
+            ..MeasurementModel::default()
+        };
+        // Across and up, faster than a ground station ever sees a satellite set.
+        let mut here = receiver();
+        here.velocity_ecef_mps += Vector3::new(300.0, -500.0, 400.0);
+        let mut fastest_mps = 0.0_f64;
+        for ephemeris in constellation(&mut ChaCha8Rng::seed_from_u64(1)).iter() {
+            let delayed = |later_s: f64, model: &MeasurementModel| {
+                let mut then = here;
+                then.time = here.time + later_s;
+                then.position_ecef_m += here.velocity_ecef_mps * later_s;
+                then.expect(ephemeris, then.receiver_clock(), model)
+                    .unwrap()
+            };
+            let (now, empty) = (
+                delayed(0.0, &model),
+                delayed(0.0, &MeasurementModel::geometry_only()),
+            );
+            if now.look.elevation_rad < 5f64.to_radians() {
+                continue;
+            }
+            let found_mps = now.range_rate_mps - empty.range_rate_mps;
+            let true_mps = delayed(0.5, &model).delay_m - delayed(-0.5, &model).delay_m;
+            // The height over which the air thins changes with height.
+            let allowed_mps = 1e-3 + 0.05 * true_mps.abs();
+            assert!(
+                (found_mps - true_mps).abs() < allowed_mps,
+                "{found_mps} {true_mps}"
+            );
+            fastest_mps = fastest_mps.max(true_mps.abs());
+        }
+        assert!(fastest_mps > 0.02, "{fastest_mps}");
     }
 }

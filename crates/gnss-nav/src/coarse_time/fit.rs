@@ -41,6 +41,7 @@ impl Seen<'_> {
     pub(super) fn rate_equation(&self) -> RateEquation {
         RateEquation::from_parts(
             &self.predicted.line_of_sight,
+            &self.predicted.delay_rate,
             self.state.clock_drift,
             self.channel.range_rate_mps,
             self.channel.range_rate_variance_m2_s2,

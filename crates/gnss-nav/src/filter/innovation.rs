@@ -181,8 +181,10 @@ fn code_row(
 /// thirtieth of the noise of 20 ms at 45 dB-Hz.
 fn rate_row(measurement: &Measurement, state: &NavState, expected: &Predicted) -> Row {
     let path = expected.line_of_sight;
-    let g = path.range_rate_gradient();
-    let predicted_mps = path.range_rate_mps(&state.velocity_ecef_mps) + state.clock_drift_mps
+    let g = path.range_rate_gradient() + expected.delay_rate.by_velocity;
+    let predicted_mps = path.range_rate_mps(&state.velocity_ecef_mps)
+        + expected.delay_rate.mps(&state.velocity_ecef_mps)
+        + state.clock_drift_mps
         - SPEED_OF_LIGHT_MPS * measurement.state.clock_drift;
     Row {
         observable: Observable::RangeRate,

@@ -5,6 +5,7 @@ use nalgebra::{Vector3, Vector4};
 use super::Velocity;
 use crate::NavError;
 use crate::constants::SPEED_OF_LIGHT_MPS;
+use crate::delay_rate::DelayRate;
 use crate::line_of_sight::LineOfSight;
 use crate::linear::{self, Row};
 use crate::measurement::{Measurement, Predicted};
@@ -22,6 +23,7 @@ impl RateEquation {
     pub(super) fn new(measurement: &Measurement, predicted: &Predicted) -> Self {
         Self::from_parts(
             &predicted.line_of_sight,
+            &predicted.delay_rate,
             measurement.state.clock_drift,
             measurement.range_rate_mps,
             measurement.range_rate_variance_m2 + predicted.delay_rate_variance_m2_s2,
@@ -30,12 +32,13 @@ impl RateEquation {
 
     pub(crate) fn from_parts(
         line_of_sight: &LineOfSight,
+        delay_rate: &DelayRate,
         satellite_clock_drift: f64,
         range_rate_mps: f64,
         variance_m2_s2: f64,
     ) -> Self {
-        let gradient = line_of_sight.range_rate_gradient();
-        let at_rest_mps = line_of_sight.range_rate_mps(&Vector3::zeros())
+        let gradient = line_of_sight.range_rate_gradient() + delay_rate.by_velocity;
+        let at_rest_mps = line_of_sight.range_rate_mps(&Vector3::zeros()) + delay_rate.at_rest_mps
             - SPEED_OF_LIGHT_MPS * satellite_clock_drift;
         Self {
             row: Row {

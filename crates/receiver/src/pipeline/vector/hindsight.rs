@@ -143,9 +143,7 @@ impl VectorTracking {
     }
 
     fn carry(&mut self, receive_time: GpsTime, measured: bool) -> Result<(), ReceiverError> {
-        self.acceleration_mps2 = self
-            .velocities
-            .mean_acceleration_mps2(&self.filter.covariance(), measured);
+        self.acceleration_mps2 = self.velocities.mean_acceleration_mps2(measured);
         let to = self.state().gps_time(receive_time);
         let interval_s = to - self.state().time;
         self.filter.predict(to)?;
@@ -174,7 +172,8 @@ impl VectorTracking {
             taken.tell(&faulty);
             let innovations = self.predict_again(taken)?;
             self.filter.update(&innovations, &taken.told)?;
-            self.velocities.remember(self.filter.state());
+            self.velocities
+                .remember(self.filter.state(), &self.filter.covariance());
         }
         let innovations = self.predict_again(now)?;
         self.scatter = scatter;

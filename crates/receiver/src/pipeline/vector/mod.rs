@@ -287,7 +287,8 @@ impl VectorTracking {
             self.outlook = Outlook::Slipped;
             epoch.events.push((None, EventKind::ClockStep { size_m }));
         }
-        self.velocities.remember(self.filter.state());
+        self.velocities
+            .remember(self.filter.state(), &self.filter.covariance());
         self.steer(around, &epoch.members, slots);
         Ok(epoch)
     }
