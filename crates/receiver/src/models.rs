@@ -65,7 +65,7 @@ mod tests {
                 (card.kind, card.interval_s),
                 (kind, VectorSettings::default().interval_s)
             );
-            assert_eq!(card.operating_point.false_alarms_per_hour, 0.01);
+            assert!(card.operating_point.false_alarms_per_hour <= 0.01);
         }
     }
 

@@ -72,13 +72,13 @@ impl Series {
     };
     /// What thresholds are found and false alarms counted by.
     pub const HEALTHY: Self = Self {
-        seed: 8,
-        week: 2499,
+        seed: 11,
+        week: 2523,
     };
     /// What is judged by.
     pub const TEST: Self = Self {
-        seed: 7,
-        week: 2491,
+        seed: 12,
+        week: 2531,
     };
     /// What models are tested on that have not learned from all there is.
     pub const GENERALISATION: Self = Self {

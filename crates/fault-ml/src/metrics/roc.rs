@@ -66,14 +66,21 @@ impl Roc {
         pairs.map(trapezium).sum()
     }
 
-    /// Detections at the lowest threshold with at most so many false alarms.
+    /// Detections at so many false alarms: on the straight line between the thresholds beside it, where many have the
+    /// same score.
     #[must_use]
     pub fn detections_at(&self, false_alarms: f64) -> f64 {
         let allowed = self
             .points
             .partition_point(|p| p.false_alarms <= false_alarms);
-        let last = allowed.checked_sub(1).and_then(|k| self.points.get(k));
-        last.map_or(0.0, |p| p.detections)
+        let Some(below) = allowed.checked_sub(1).and_then(|k| self.points.get(k)) else {
+            return 0.0;
+        };
+        self.points.get(allowed).map_or(below.detections, |above| {
+            let part =
+                (false_alarms - below.false_alarms) / (above.false_alarms - below.false_alarms);
+            below.detections + part * (above.detections - below.detections)
+        })
     }
 
     /// 2.5 and 97.5 % of each of `values` of the curve over `rounds` draws of whole groups with replacement: steps of
@@ -147,6 +154,8 @@ mod tests {
         let roc = Roc::new(&scores).unwrap();
         assert_eq!(roc.detections_at(0.0), 2.0 / 60.0);
         assert_eq!(roc.detections_at(1.0), 1.0);
+        let tied = Roc::new(&[(1.0, true), (1.0, false), (0.0, true), (0.0, false)]).unwrap();
+        assert_eq!(tied.detections_at(0.25), 0.25);
         let last = roc.points().last().unwrap();
         assert_eq!((last.false_alarms, last.threshold < 0.0), (1.0, true));
         let group = |g: usize| scores.iter().skip(g).step_by(10).copied().collect();

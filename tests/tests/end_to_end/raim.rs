@@ -18,7 +18,7 @@ const ONSET_S: f64 = 75.0;
 const STEP_M: f64 = 40.0;
 
 fn car(fault: &str) -> Scenario {
-    let text = include_str!("../../assets/scenarios/vehicle-turns.toml");
+    let text = include_str!("../../../assets/scenarios/vehicle-turns.toml");
     let text = format!("{text}\n{fault}");
     let file = ScenarioFile::parse("car", "car", Path::new(""), text).unwrap();
     let mut scenario = Scenario::new(&file, None).unwrap();

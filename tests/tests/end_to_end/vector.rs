@@ -7,6 +7,7 @@ use xtask::judged::{Judged, JudgedEpoch, receive, rms, settings};
 use xtask::scenario::built::Scenario;
 use xtask::scenario::catalogue;
 use xtask::scenario::make::Level;
+use xtask::train::plan::{Plan, Series};
 
 /// The receiver in vector mode, with the settings of its command line's defaults.
 fn vector(scenario: &Scenario) -> Settings {
@@ -274,6 +275,23 @@ fn an_oscillator_with_much_white_noise_leads_no_channel_astray() {
             judged.epochs.iter().all(|e| e.horizontal_m() < 5.0),
             "{tow_s}"
         );
+    }
+}
+
+#[test]
+fn a_start_with_five_weak_satellites_does_not_run_away() {
+    // Drawn at random; its first velocity is wrong by 16 m/s, which the second epoch finds.
+    let series = Series {
+        seed: 9,
+        week: 2507,
+    };
+    let scenario = Plan::healthy(446, series, 8.0).scenario().unwrap();
+    let judged = run(&scenario);
+    let excluded = happened(&judged, 0.0, |k| matches!(k, EventKind::Excluded { .. }));
+    assert_eq!(excluded, None);
+    for epoch in judged.between(4.7, 8.0) {
+        let (speed_mps, time_s) = (epoch.velocity_enu_mps.norm(), epoch.pvt.time_s);
+        assert!(speed_mps < 1.0, "{speed_mps} m/s at {time_s}");
     }
 }
 
