@@ -247,6 +247,13 @@ mod tests {
             // A time of the fraction of a second rounds to 1e-16 s.
             assert!((later_s * SPEED_OF_LIGHT_MPS - air.delay_m).abs() < 1e-6);
         }
+        let ionosphere = MeasurementModel {
+            troposphere: false,
+            ..through_air()
+        };
+        for (air, none) in expected(0.0, &ionosphere).iter().zip(&empty) {
+            assert_eq!(air.doppler_hz, none.doppler_hz);
+        }
     }
 
     #[test]
