@@ -192,27 +192,34 @@ const FLOWN_FROM_DBHZ: f64 = 40.0;
 /// False alarms of a channel an hour in a flight.
 const FLIGHT_ALARMS_PER_HOUR: f64 = 0.1;
 
-/// What is learned from.
+/// What a monitor that flies is learned from.
 #[derive(Debug, Clone)]
 pub struct Lessons {
-    /// Flights with a blockage, some of them held out.
-    pub split: Split,
+    /// Flights with a blockage.
+    blocked: Split,
     /// Flights without one, that thresholds are found by.
     quiet: Dataset,
 }
 
-/// `seeds` runs of every class at the correlator level, a quarter of them held out, and a quarter as many in which
-/// nothing is blocked. Some blockages end: a layer that has never seen one end holds a channel faulty for a whole window
-/// after two large innovations by chance.
+/// `seeds` runs of every class at the correlator level, a quarter of them held out.
+///
+/// # Errors
+/// Where a run fails.
+pub fn learned_from(flight: Flight, seeds: usize) -> Result<Split> {
+    let data = harvest(flight, seeds, LEARNED_FROM, Level::Correlator)?;
+    Ok(data.split(HELD_OUT, 0.0, 1))
+}
+
+/// `seeds` runs of every class and a quarter as many in which nothing is blocked. Some blockages end: a layer that
+/// has never seen one end holds a channel faulty for a whole window after two large innovations by chance.
 ///
 /// # Errors
 /// Where a run fails.
 pub fn lessons(seeds: usize) -> Result<Lessons> {
-    let level = Level::Correlator;
-    let blocked = harvest(Flight::BlockedOrPassing, seeds, LEARNED_FROM, level)?;
+    let quiet = seeds.div_ceil(4);
     Ok(Lessons {
-        split: blocked.split(HELD_OUT, 0.0, 1),
-        quiet: harvest(Flight::Quiet, seeds.div_ceil(4), QUIET_FROM, level)?,
+        blocked: learned_from(Flight::BlockedOrPassing, seeds)?,
+        quiet: harvest(Flight::Quiet, quiet, QUIET_FROM, Level::Correlator)?,
     })
 }
 
@@ -226,8 +233,8 @@ pub fn monitor(kind: ModelKind, lessons: &Lessons) -> Result<LearnedModel> {
         ModelKind::Lstm => LSTM_LENGTH,
     };
     let split = Split {
-        training: flown(&lessons.split.training),
-        validation: flown(&lessons.split.validation),
+        training: flown(&lessons.blocked.training),
+        validation: flown(&lessons.blocked.validation),
         test: Dataset::default(),
     };
     let (held_out, quiet) = (&split.validation, &flown(&lessons.quiet));

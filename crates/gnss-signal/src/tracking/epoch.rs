@@ -28,6 +28,8 @@ pub struct ChannelEpoch {
     pub doppler_variance_hz2: f64,
     /// How long before the epoch a steered channel's Doppler holds, s; zero where it is carried there.
     pub doppler_age_s: f64,
+    /// Where the Doppler of a steered channel had to lie to be told; `None`: anywhere.
+    pub doppler_reach: Option<DopplerReach>,
     /// Integral of the Doppler since the channel's start, cycles.
     pub doppler_cycles: f64,
     /// Phase lock was lost since the previous epoch.
@@ -50,6 +52,23 @@ pub struct ChannelEpoch {
     pub frequency_error_hz: f64,
 }
 
+/// What a frequency discriminator tells: further from the oscillator a Doppler is taken for another one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DopplerReach {
+    /// Doppler of the oscillator, Hz.
+    pub oscillator_hz: f64,
+    /// How far from it, Hz.
+    pub width_hz: f64,
+}
+
+impl DopplerReach {
+    /// Whether a signal of `doppler_hz` is told from others.
+    #[must_use]
+    pub fn holds(&self, doppler_hz: f64) -> bool {
+        (doppler_hz - self.oscillator_hz).abs() <= self.width_hz
+    }
+}
+
 /// What the integrations of an epoch say together.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct EpochValues {
@@ -63,9 +82,19 @@ pub(super) struct EpochValues {
     pub(super) doppler_variance_hz2: f64,
     /// When the Doppler holds, s on the channel's clock; `None`: at the epoch.
     pub(super) doppler_at_s: Option<f64>,
+    /// How far from the oscillator's it can be told, Hz.
+    pub(super) reach_hz: f64,
 }
 
 impl EpochValues {
+    /// Where the Doppler had to lie to be told, above zero when approaching where `sign` is that of the spectrum.
+    pub(super) fn reach(&self, sign: f64) -> Option<DopplerReach> {
+        self.reach_hz.is_finite().then(|| DopplerReach {
+            oscillator_hz: sign * (self.doppler_hz - self.frequency_error_hz),
+            width_hz: self.reach_hz,
+        })
+    }
+
     /// Nothing was measured; the oscillator has that Doppler.
     pub(super) const fn nothing(doppler_hz: f64) -> Self {
         Self {
@@ -76,6 +105,7 @@ impl EpochValues {
             doppler_hz,
             doppler_variance_hz2: f64::INFINITY,
             doppler_at_s: None,
+            reach_hz: f64::INFINITY,
         }
     }
 }

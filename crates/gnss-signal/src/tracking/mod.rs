@@ -18,7 +18,7 @@ mod steady;
 mod steered;
 
 pub use channel::{BitSync, Channel, ChannelUpdate, NavBit};
-pub use epoch::ChannelEpoch;
+pub use epoch::{ChannelEpoch, DopplerReach};
 pub use lock::Lock;
 pub use noise::NoiseFloor;
 pub use settings::{Spectrum, TrackingSettings};

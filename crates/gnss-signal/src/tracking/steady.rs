@@ -452,6 +452,7 @@ impl Steady {
             doppler_age_s: measured
                 .doppler_at_s
                 .map_or(0.0, |s| tick as f64 / at.front_end.sample_rate_hz - s),
+            doppler_reach: measured.reach(sign),
             doppler_cycles: sign * at.doppler_cycles,
             phase_slipped: std::mem::replace(&mut self.slipped, self.lock != Lock::Carrier),
             cn0_dbhz: cn0::dbhz(self.cn0_hz),
@@ -485,6 +486,7 @@ impl Steady {
                     doppler_hz,
                     doppler_variance_hz2,
                     doppler_at_s: None,
+                    reach_hz: f64::INFINITY,
                 }
             }
             Helm::Navigation(steered) => {
@@ -501,6 +503,7 @@ impl Steady {
                         doppler_hz,
                         doppler_variance_hz2,
                         doppler_at_s: None,
+                        reach_hz: f64::INFINITY,
                         ..values
                     },
                 }

@@ -85,15 +85,15 @@ impl Study {
     /// # Errors
     /// Where a run or a training fails.
     pub fn run(level: Level, seeds: usize, lengths: &[usize], trainings: u64) -> Result<Self> {
-        let lessons = paper::lessons(seeds)?;
+        let split = paper::learned_from(paper::Flight::Blocked, seeds)?;
         let judging = seeds.div_ceil(2);
         let judges = paper::harvest(paper::Flight::Blocked, judging, paper::JUDGED_BY, level)?;
-        let cells = curve(&lessons.split, &judges, lengths, trainings)?;
+        let cells = curve(&split, &judges, lengths, trainings)?;
         Ok(Self {
             level,
             seeds,
             cells,
-            flights: flights(&lessons, level)?,
+            flights: flights(&paper::lessons(seeds)?, level)?,
         })
     }
 

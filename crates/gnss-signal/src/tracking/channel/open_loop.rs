@@ -318,6 +318,7 @@ impl PullIn {
             doppler_hz: sign * nco.doppler_hz,
             doppler_variance_hz2: data * 6.0 / (TAU * TAU * snr * length_s * length_s),
             doppler_age_s: 0.0,
+            doppler_reach: None,
             doppler_cycles: sign * nco.doppler_cycles,
             phase_slipped: true,
             cn0_dbhz: cn0::dbhz(cn0_hz),

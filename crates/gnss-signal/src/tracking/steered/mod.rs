@@ -47,6 +47,16 @@ pub enum FrequencyPairs {
     Successive,
 }
 
+impl FrequencyPairs {
+    /// Half of what errors by sums of `sums_s` are ambiguous beyond, Hz: up to there they are in proportion to 0.9.
+    fn reach_hz(self, sums_s: f64) -> f64 {
+        match self {
+            Self::Halves => 1.0 / (4.0 * sums_s),
+            Self::Successive => 1.0 / (8.0 * sums_s),
+        }
+    }
+}
+
 /// What a steered channel measures of a signal that is gone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Silence {
@@ -321,6 +331,7 @@ impl Steered {
             frequency_error_hz: frequencies().map(|f| f.error_hz).sum::<f64>() / pairs.max(1.0),
             doppler_hz: frequencies().map(|f| f.doppler_hz).sum::<f64>() / pairs.max(1.0),
             doppler_variance_hz2: reception.frequency_variance_hz2(sums_s) / pairs,
+            reach_hz: settings.pairs.reach_hz(sums_s),
             doppler_at_s: (pairs > 0.0).then(|| frequencies().map(|f| f.at_s).sum::<f64>() / pairs),
         })
     }

@@ -8,12 +8,17 @@ use std::collections::VecDeque;
 use fault_ml::learned::ChannelStep;
 use gnss_nav::filter::{Covariance, Disposition, Innovations};
 use gnss_nav::{GpsTime, Measurement, NavState, SatelliteId};
+use gnss_signal::tracking::DopplerReach;
 use nalgebra::Vector3;
 
 use super::acceleration::{Velocities, change_of_rate_mps};
 use super::filter::filter;
-use super::{VectorTracking, monitors};
+use super::{VectorTracking, monitors, reach};
 use crate::ReceiverError;
+
+/// Oscillators are where the filter puts them, and what they measured elsewhere is past, so long after it was corrected,
+/// s: three of the longest intervals.
+const IN_PLACE_S: f64 = 0.06;
 
 /// What was known before an epoch.
 #[derive(Debug, Clone)]
@@ -30,7 +35,7 @@ pub(super) struct Taken {
     /// Whether the epoch before was measured.
     measured: bool,
     /// Reading of the receiver's clock.
-    receive_time: GpsTime,
+    pub(super) receive_time: GpsTime,
     /// What the drift became less certain by, m^2/s^2.
     pub(super) drift_variance_m2_s2: f64,
     /// Acceleration that range rates were carried to the epoch by, ECEF, m/s^2.
@@ -38,6 +43,8 @@ pub(super) struct Taken {
     pub(super) measurements: Vec<Measurement>,
     /// How old range rates were.
     pub(super) ages_s: Vec<(SatelliteId, f64)>,
+    /// Where Dopplers had to lie to be told.
+    pub(super) reaches: Vec<(SatelliteId, DopplerReach)>,
     /// What monitors were shown.
     pub(super) shown: Vec<(SatelliteId, ChannelStep)>,
     /// What the filter was told of the measurements.
@@ -85,6 +92,8 @@ pub(super) struct Hindsight {
     epochs: VecDeque<Taken>,
     /// Whether the filter is no longer where measurements alone led it from the last of them.
     moved: bool,
+    /// When last epochs were taken in again.
+    corrected: Option<GpsTime>,
 }
 
 impl Hindsight {
@@ -101,6 +110,11 @@ impl Hindsight {
     pub(super) fn clear(&mut self) {
         self.epochs.clear();
         self.moved = true;
+    }
+
+    /// Whether what is measured at `now` may be by oscillators that the filter put where it no longer is.
+    pub(super) fn was_corrected(&self, now: GpsTime) -> bool {
+        self.corrected.is_some_and(|at| now - at <= IN_PLACE_S)
     }
 
     /// What the filter is `told` of at this epoch, of satellites that it used at the last.
@@ -129,6 +143,7 @@ impl VectorTracking {
             acceleration_mps2: self.acceleration_mps2,
             measurements: Vec::new(),
             ages_s: Vec::new(),
+            reaches: Vec::new(),
             shown: Vec::new(),
             told: Vec::new(),
         })
@@ -183,6 +198,7 @@ impl VectorTracking {
             self.watch(*satellite).hear_again(&steps)?;
         }
         self.hindsight.epochs = epochs;
+        self.hindsight.corrected = Some(now.receive_time);
         Ok(Some(innovations))
     }
 
@@ -192,7 +208,10 @@ impl VectorTracking {
         self.carry(taken.receive_time, taken.measured)?;
         self.filter.loosen_drift(taken.drift_variance_m2_s2)?;
         taken.accelerate(self.acceleration_mps2, &self.state().position_ecef_m);
-        let innovations = self.filter.innovations(&taken.measurements)?;
+        let mut innovations = self.filter.innovations(&taken.measurements)?;
+        if reach::close(&mut taken.measurements, &innovations, &taken.reaches) {
+            innovations = self.filter.innovations(&taken.measurements)?;
+        }
         let given = self.deviations(&innovations)?;
         for (innovation, given) in innovations.satellites().iter().zip(&given) {
             let mut shown = taken.shown.iter_mut();

@@ -11,6 +11,7 @@ mod hindsight;
 mod judge;
 mod monitors;
 mod rate_gate;
+mod reach;
 mod report;
 mod restart;
 mod scatter;
@@ -275,6 +276,10 @@ impl VectorTracking {
         now.measurements = measurements;
         let ages = epoch.members.iter().filter(|m| m.raw.is_some());
         now.ages_s = ages.map(|m| (m.satellite, m.epoch.doppler_age_s)).collect();
+        let reaches = epoch.members.iter();
+        now.reaches = reaches
+            .filter_map(|m| Some((m.satellite, m.epoch.doppler_reach?)))
+            .collect();
         self.update(now, &mut epoch)?;
         if self.contradicting >= CONTRADICTING {
             self.outlook = Outlook::Contradicted;
@@ -387,6 +392,10 @@ impl VectorTracking {
         if let Some(step) = clock_step::find(&innovations) {
             self.step_clock(&step, epoch)?;
             innovations = self.filter.innovations(measurements)?;
+        }
+        let moved = self.hindsight.was_corrected(now.receive_time);
+        if moved && reach::close(&mut now.measurements, &innovations, &now.reaches) {
+            innovations = self.filter.innovations(&now.measurements)?;
         }
         self.show(&innovations, &mut epoch.members)?;
         let shown = epoch
