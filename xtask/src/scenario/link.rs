@@ -22,7 +22,8 @@ const LEAD_S: f64 = 2.0;
 /// Models of the delays on the way.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Atmosphere {
-    /// Ionosphere: delays the code, advances the carrier.
+    /// Ionosphere: delays the code, advances the carrier. Without the steps that a receiver's model of it has at dusk and
+    /// dawn.
     pub ionosphere: Option<Klobuchar>,
     /// Whether the Saastamoinen troposphere delays both (it ends at 20 km of height).
     pub troposphere: bool,
@@ -169,7 +170,7 @@ fn sky(position: &Vector3<f64>, path: &Path, time: GpsTime, atmosphere: Atmosphe
     let look = place.look(&path.unit_ecef);
     let ionosphere = atmosphere.ionosphere;
     Sky {
-        ionosphere_m: ionosphere.map_or(0.0, |model| model.delay_m(&place, &look, time)),
+        ionosphere_m: ionosphere.map_or(0.0, |model| model.steady_delay_m(&place, &look, time)),
         troposphere_m: if atmosphere.troposphere {
             saastamoinen_delay_m(&place, look.elevation_rad)
         } else {
@@ -235,7 +236,7 @@ mod tests {
             };
             let expected = predict(&ephemeris, &receiver).unwrap();
             let place = Geodetic::from_ecef(&motion.position_ecef_m);
-            let ionosphere_m = KLOBUCHAR.delay_m(&place, &expected.look, receiver.time);
+            let ionosphere_m = KLOBUCHAR.steady_delay_m(&place, &expected.look, receiver.time);
             let troposphere_m = saastamoinen_delay_m(&place, expected.look.elevation_rad);
             let arrival = link.arrival(elapsed_s, elapsed_s, Extra::default());
             let delay_s = (ionosphere_m + troposphere_m) / SPEED_OF_LIGHT_MPS;
