@@ -13,7 +13,7 @@ use candle_nn::rnn::{LSTMConfig, RNN, lstm};
 use criterion::{Criterion, criterion_group, criterion_main};
 use fault_ml::learned::lstm::{LstmCell, LstmWeights};
 use fault_ml::learned::svm::SvmPredictor;
-use fault_ml::learned::{ChannelStep, FeatureSet, LearnedModel, LearnedMonitor};
+use fault_ml::learned::{ChannelStep, FeatureSet, LearnedModel, LearnedMonitor, StrengthChange};
 use fault_ml::{ChannelMonitor, Innovation};
 use linfa::prelude::*;
 use linfa_svm::Svm;
@@ -131,6 +131,10 @@ fn product(c: &mut Criterion) {
             given_others: innovation,
             cn0_dbhz: 42.0 + within(0.2),
             cn0_now_hz: 10_f64.powf(4.2 + within(0.1)),
+            others_change: StrengthChange {
+                smoothed_db: within(0.1),
+                now_db: within(0.5),
+            },
             tap_ratios: Some([0.75 + within(0.03), 0.75 + within(0.03)]),
         }
     };

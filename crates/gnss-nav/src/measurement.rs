@@ -143,7 +143,7 @@ pub struct ErrorModel {
 pub(crate) const LOWEST_ELEVATION_RAD: f64 = 0.05;
 
 impl ErrorModel {
-    /// Tracking noise alone: for signals simulated with exactly the modelled delays.
+    /// Tracking noise alone: for signals simulated with the modelled delays.
     pub const TRACKING_NOISE_ONLY: Self = Self {
         ura_fraction: 0.0,
         ionosphere_fraction: 0.0,

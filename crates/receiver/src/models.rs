@@ -28,7 +28,7 @@ pub fn default_model(kind: ModelKind) -> Result<Arc<LearnedModel>, LearnedError>
 
 #[cfg(test)]
 mod tests {
-    use fault_ml::learned::{ChannelStep, LearnedMonitor};
+    use fault_ml::learned::{ChannelStep, LearnedMonitor, StrengthChange};
     use fault_ml::{ChannelMonitor, Innovation};
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
@@ -52,6 +52,10 @@ mod tests {
             given_others: innovation,
             cn0_dbhz: 42.0 + 0.1 * normal(),
             cn0_now_hz: 10_f64.powf(4.2 + 0.08 * normal()),
+            others_change: StrengthChange {
+                smoothed_db: 0.05 * normal(),
+                now_db: 0.3 * normal(),
+            },
             tap_ratios: Some([0.75 + 0.02 * normal(), 0.75 + 0.02 * normal()]),
         }
     }

@@ -373,7 +373,7 @@ fn sorted(mut gaps: Vec<Gap>) -> Vec<Gap> {
 }
 
 /// The model with the steps of its broadcast parameters (IS-GPS-200, table 20-X), so that the
-/// signal is delayed by exactly what the receiver is told.
+/// signal is delayed by what the receiver is told.
 fn as_broadcast(model: Klobuchar) -> Klobuchar {
     let round = |values: [f64; 4], exponents: [i32; 4]| {
         std::array::from_fn(|k| {

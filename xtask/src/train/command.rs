@@ -76,7 +76,8 @@ pub fn train(trained: Trained, training: &Dataset, runs: u32) -> Result<LearnedM
     let numbers = 0..quiet::runs(CHANNEL_HOURS);
     let interval_s = model.card().interval_s;
     let model = with_evidence(model, &unwatched, FALSE_ALARMS_PER_HOUR, |examinees| {
-        quiet::scores(Series::VALIDATION, numbers.clone(), examinees, interval_s)
+        let all = quiet::scores(Series::VALIDATION, numbers.clone(), examinees, interval_s)?;
+        Ok(all.into_iter().map(|quiet| quiet.scores).collect())
     })?;
     let mut card = model.card().clone();
     card.training["data"] = json!({

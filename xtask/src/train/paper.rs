@@ -195,17 +195,17 @@ const FLIGHT_ALARMS_PER_HOUR: f64 = 0.1;
 /// What a monitor that flies is learned from.
 #[derive(Debug, Clone)]
 pub struct Lessons {
-    /// Flights with a blockage.
+    /// Flights with a blockage, some of them held out.
     blocked: Split,
     /// Flights without one, that thresholds are found by.
     quiet: Dataset,
 }
 
-/// `seeds` runs of every class at the correlator level, a quarter of them held out.
+/// `seeds` runs of every class with what `flight` says, at the correlator level, a quarter of them held out.
 ///
 /// # Errors
 /// Where a run fails.
-pub fn learned_from(flight: Flight, seeds: usize) -> Result<Split> {
+pub fn lessons_of(flight: Flight, seeds: usize) -> Result<Split> {
     let data = harvest(flight, seeds, LEARNED_FROM, Level::Correlator)?;
     Ok(data.split(HELD_OUT, 0.0, 1))
 }
@@ -218,7 +218,7 @@ pub fn learned_from(flight: Flight, seeds: usize) -> Result<Split> {
 pub fn lessons(seeds: usize) -> Result<Lessons> {
     let quiet = seeds.div_ceil(4);
     Ok(Lessons {
-        blocked: learned_from(Flight::BlockedOrPassing, seeds)?,
+        blocked: lessons_of(Flight::BlockedOrPassing, seeds)?,
         quiet: harvest(Flight::Quiet, quiet, QUIET_FROM, Level::Correlator)?,
     })
 }

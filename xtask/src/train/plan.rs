@@ -72,13 +72,13 @@ impl Series {
     };
     /// What thresholds are found and false alarms counted by.
     pub const HEALTHY: Self = Self {
-        seed: 11,
-        week: 2523,
+        seed: 13,
+        week: 2539,
     };
     /// What is judged by.
     pub const TEST: Self = Self {
-        seed: 12,
-        week: 2531,
+        seed: 14,
+        week: 2547,
     };
     /// What models are tested on that have not learned from all there is.
     pub const GENERALISATION: Self = Self {

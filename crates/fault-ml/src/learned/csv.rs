@@ -3,15 +3,15 @@
 use std::io::{BufRead, Write};
 
 use super::dataset::{Dataset, Label, LabelledStep, Sequence};
-use super::{ChannelStep, LearnedError};
+use super::{ChannelStep, LearnedError, StrengthChange};
 use crate::Innovation;
 
 /// Columns.
 const HEADER: &str = "scenario,satellite,fault,time_s,code_m,code_sigma_m,rate_mps,rate_sigma_mps,\
-given_code_m,given_code_sigma_m,given_rate_mps,given_rate_sigma_mps,cn0_dbhz,cn0_now_hz,early_ratio,\
-late_ratio,label";
+given_code_m,given_code_sigma_m,given_rate_mps,given_rate_sigma_mps,cn0_dbhz,cn0_now_hz,\
+others_cn0_db,others_now_db,early_ratio,late_ratio,label";
 /// Number of them.
-const COLUMNS: usize = 17;
+const COLUMNS: usize = 19;
 /// Steps farther apart than this belong to different sequences, s.
 const LONGEST_GAP_S: f64 = 0.15;
 
@@ -44,6 +44,8 @@ pub fn write_csv(data: &Dataset, out: &mut impl Write) -> Result<(), LearnedErro
             }
             let label = u8::from(labelled.label.is_faulty());
             write!(out, "{},{},", step.cn0_dbhz, step.cn0_now_hz)?;
+            let others = &step.others_change;
+            write!(out, "{},{},", others.smoothed_db, others.now_db)?;
             match step.tap_ratios {
                 Some([early, late]) => write!(out, "{early},{late},")?,
                 None => write!(out, ",,")?,
@@ -109,6 +111,8 @@ fn parse(number: usize, line: &str) -> Result<Row<'_>, LearnedError> {
         ref innovations @ ..,
         cn0,
         power,
+        others,
+        others_now,
         early,
         late,
         label,
@@ -163,6 +167,10 @@ fn parse(number: usize, line: &str) -> Result<Row<'_>, LearnedError> {
         )?,
         cn0_dbhz: real("cn0_dbhz", cn0)?,
         cn0_now_hz: real("cn0_now_hz", power)?,
+        others_change: StrengthChange {
+            smoothed_db: real("others_cn0_db", others)?,
+            now_db: real("others_now_db", others_now)?,
+        },
         tap_ratios: if early.is_empty() && late.is_empty() {
             None
         } else {
@@ -203,6 +211,8 @@ mod tests {
                 step.innovation.rate_mps = 0.0;
                 step.innovation.rate_sigma_mps = f64::INFINITY;
                 step.given_others.code_m = 0.3;
+                step.others_change.smoothed_db = -0.1;
+                step.others_change.now_db = 2.5;
                 step.tap_ratios = None;
             }
             LabelledStep {
@@ -237,23 +247,26 @@ mod tests {
 
     #[test]
     fn a_bad_row_is_named() {
-        let good = "1,7,ramp,0.1,1,8,0.1,0.2,1,8,,,45,600,0.75,0.74,0";
+        let good = "1,7,ramp,0.1,1,8,0.1,0.2,1,8,,,45,600,-1.5,0,0.75,0.74,0";
         let read = |line: &str| read_csv(format!("{HEADER}\n{good}\n{line}\n").as_bytes());
         assert_eq!(read(good).unwrap().steps(), 2);
         for (line, column) in [
             ("1,7,ramp", "row"),
             (
-                "x,7,ramp,0.1,1,8,0.1,0.2,1,8,,,45,600,0.75,0.74,0",
+                "x,7,ramp,0.1,1,8,0.1,0.2,1,8,,,45,600,-1.5,0,0.75,0.74,0",
                 "scenario",
             ),
             (
-                "1,7,ramp,0.1,nan,8,0.1,0.2,1,8,,,45,600,0.75,0.74,0",
+                "1,7,ramp,0.1,nan,8,0.1,0.2,1,8,,,45,600,-1.5,0,0.75,0.74,0",
                 "code_m",
             ),
-            ("1,7,ramp,0.1,1,8,,0.2,1,8,,,45,600,0.75,0.74,0", "rate_mps"),
-            ("1,7,ramp,0.1,1,8,0.1,0.2,1,8,,,45,600,,,2", "label"),
             (
-                "1,7,ramp,0.1,1,8,0.1,0.2,1,8,,,45,600,0.75,,0",
+                "1,7,ramp,0.1,1,8,,0.2,1,8,,,45,600,-1.5,0,0.75,0.74,0",
+                "rate_mps",
+            ),
+            ("1,7,ramp,0.1,1,8,0.1,0.2,1,8,,,45,600,-1.5,0,,,2", "label"),
+            (
+                "1,7,ramp,0.1,1,8,0.1,0.2,1,8,,,45,600,-1.5,0,0.75,,0",
                 "late_ratio",
             ),
         ] {

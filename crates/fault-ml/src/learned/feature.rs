@@ -18,12 +18,12 @@ const SQUARE_SHARE: f64 = 0.1;
 /// Weights of the newest step in the running means of the taps' ratio (memories of 10 and 50 steps).
 const SHAPE_SHARES: [f64; 2] = [0.2, 0.04];
 /// Weight of the newest step in the C/N0, and in the ratio of taps, that a channel is used to: 500 steps, ten seconds.
-const USUAL_SHARE: f64 = 0.002;
+pub(super) const USUAL_SHARE: f64 = 0.002;
 /// Length of a step for the noise of the taps' ratio, s.
 const STEP_S: f64 = 0.02;
 /// C/N0 that counts as zero, dB-Hz, and what counts as one, dB.
 const CN0_MIDDLE_DBHZ: f64 = 40.0;
-const DECADE_DB: f64 = 10.0;
+pub(super) const DECADE_DB: f64 = 10.0;
 
 /// A set of features.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -33,10 +33,10 @@ pub enum FeatureSet {
     Paper,
     /// Both given the other channels, over their predicted deviations; running means of them and of their squares
     /// over their own deviations (a small error that lasts stands out there); C/N0, the same against what the
-    /// channel is used to, and that of the last integration against the smoothed one, which answers at once; running
-    /// means of the ratio metric, early plus late over twice prompt, against what the channel is used to, over
-    /// their own deviations. Of large numbers the inverse hyperbolic sine: they keep their order without drowning
-    /// the others.
+    /// channel is used to, and that of the last integration against the smoothed one, which answers at once, the
+    /// last two less what they are for the other channels; running means of the ratio metric, early plus late over twice prompt,
+    /// against what the channel is used to, over their own deviations. Of large numbers the inverse hyperbolic sine: they
+    /// keep their order without drowning the others.
     Full,
 }
 
@@ -154,14 +154,15 @@ impl FeatureTrack {
             }
             FeatureSet::Full => {
                 let (code, rate) = measured(&step.given_others)?;
-                let (cn0, power) = strength(step)?;
+                let (cn0, power) = strength(step.cn0_dbhz, step.cn0_now_hz)?;
+                let others = others(step)?;
                 let ratios = shape(step)?;
                 let (code, rate) = (normalised(code), rate.map(normalised));
                 if let Some(ratios) = ratios {
                     self.shape.follow(ratios, step.cn0_dbhz);
                 }
-                self.remember(code, rate, cn0);
-                let full = self.full(code, rate.unwrap_or_default(), cn0, power);
+                self.remember(code, rate, cn0, others[0]);
+                let full = self.full(code, rate.unwrap_or_default(), [cn0, power], others);
                 values = full.map(|value| value as f32);
             }
         }
@@ -171,7 +172,9 @@ impl FeatureTrack {
         })
     }
 
-    fn full(&self, code: f64, rate: f64, cn0: f64, power: f64) -> [f64; WIDEST] {
+    fn full(&self, code: f64, rate: f64, own: [f64; 2], others: [f64; 2]) -> [f64; WIDEST] {
+        let [cn0, power] = own;
+        let [others_cn0, others_power] = others;
         let [short, long] = self.code;
         let [short_share, long_share] = CODE_SHARES;
         let [code_square, rate_square] = self.squares;
@@ -186,14 +189,14 @@ impl FeatureTrack {
             (self.rate / spread(RATE_SHARE)).asinh(),
             (rate_square / spread(SQUARE_SHARE)).asinh(),
             cn0,
-            cn0 - self.usual_cn0.unwrap_or(cn0),
-            power,
+            cn0 - self.usual_cn0.unwrap_or(cn0) - others_cn0,
+            power - others_power,
             (shape / spread(shape_share)).asinh(),
             (lasting_shape / spread(lasting_share)).asinh(),
         ]
     }
 
-    fn remember(&mut self, code: f64, rate: Option<f64>, cn0: f64) {
+    fn remember(&mut self, code: f64, rate: Option<f64>, cn0: f64, others_cn0: f64) {
         for (mean, share) in self.code.iter_mut().zip(CODE_SHARES) {
             *mean += share * (code - *mean);
         }
@@ -206,7 +209,8 @@ impl FeatureTrack {
                 *mean += SQUARE_SHARE * (value * value - 1.0 - *mean);
             }
         }
-        let usual = self.usual_cn0.get_or_insert(cn0);
+        // One that begins while all are weaker was stronger before, as the others were.
+        let usual = self.usual_cn0.get_or_insert(cn0 - others_cn0);
         *usual += USUAL_SHARE * (cn0 - *usual);
     }
 }
@@ -258,23 +262,33 @@ fn shape(step: &ChannelStep) -> Result<Option<[f64; 2]>, MonitorError> {
 }
 
 /// C/N0 about 40 dB-Hz, and that of the last integration against it, both in tens of decibels.
-fn strength(step: &ChannelStep) -> Result<(f64, f64), MonitorError> {
-    within(
-        "C/N0 (dB-Hz)",
-        step.cn0_dbhz,
-        (-100.0, 200.0),
-        "-100 to 200",
-    )?;
+pub(super) fn strength(cn0_dbhz: f64, cn0_now_hz: f64) -> Result<(f64, f64), MonitorError> {
+    within("C/N0 (dB-Hz)", cn0_dbhz, (-100.0, 200.0), "-100 to 200")?;
     within(
         "C/N0 now (Hz)",
-        step.cn0_now_hz,
+        cn0_now_hz,
         (-1e12, 1e12),
         "a number up to 1e12",
     )?;
-    let cn0 = (step.cn0_dbhz - CN0_MIDDLE_DBHZ) / DECADE_DB;
+    let cn0 = (cn0_dbhz - CN0_MIDDLE_DBHZ) / DECADE_DB;
     // Of a sum of 20 ms at 40 dB-Hz: 200. One more keeps the logarithm of nothing finite.
-    let power = ((0.02 * step.cn0_now_hz.max(0.0) + 1.0) / 200.0).log10();
+    let power = ((0.02 * cn0_now_hz.max(0.0) + 1.0) / 200.0).log10();
     Ok((cn0, power - cn0))
+}
+
+/// What the C/N0 of the others has changed by, in tens of decibels.
+fn others(step: &ChannelStep) -> Result<[f64; 2], MonitorError> {
+    let change = &step.others_change;
+    let both = [change.smoothed_db, change.now_db];
+    for change_db in both {
+        within(
+            "change of the others' C/N0 (dB)",
+            change_db,
+            (-1e3, 1e3),
+            "-1000 to 1000",
+        )?;
+    }
+    Ok(both.map(|change_db| change_db / DECADE_DB))
 }
 
 #[cfg(test)]
@@ -283,6 +297,7 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
     use rand_distr::StandardNormal;
 
+    use super::super::StrengthChange;
     use super::*;
 
     #[test]
@@ -309,6 +324,42 @@ mod tests {
         }
         for set in [FeatureSet::Paper, FeatureSet::Full] {
             assert_eq!(features(set).values().len(), set.width());
+        }
+    }
+
+    #[test]
+    fn what_the_others_lose_too_is_no_loss() {
+        let fallen = |own_db: f64, others_db: f64| {
+            let mut step = ChannelStep::normal(1, 0.0, 0.0);
+            step.cn0_dbhz += own_db;
+            step.cn0_now_hz *= 10_f64.powf(2.0 * own_db / 10.0);
+            step.others_change = StrengthChange {
+                smoothed_db: others_db,
+                now_db: others_db,
+            };
+            step
+        };
+        let after = |steps: &[ChannelStep]| {
+            let mut track = FeatureTrack::new(FeatureSet::Full);
+            let all = steps.iter().map(|step| track.next(step).unwrap());
+            let last = all.last().unwrap();
+            [8, 9].map(|k| f64::from(last.values()[k]))
+        };
+        let before = after(&[fallen(0.0, 0.0)]);
+        let alone = after(&[fallen(0.0, 0.0), fallen(-6.0, 0.0)]);
+        let together = after(&[fallen(0.0, 0.0), fallen(-6.0, -6.0)]);
+        let begun = after(&[fallen(-6.0, -6.0)]);
+        for (k, name) in ["smoothed", "now"].into_iter().enumerate() {
+            // Of the last integration a little is noise: 0.02 of 60 at this C/N0.
+            assert!(
+                (alone[k] - before[k] + 0.6).abs() < 0.05,
+                "{name} {alone:?}"
+            );
+            assert!(
+                (together[k] - before[k]).abs() < 0.05,
+                "{name} {together:?}"
+            );
+            assert!((begun[k] - before[k]).abs() < 0.05, "{name} {begun:?}");
         }
     }
 
@@ -383,7 +434,7 @@ mod tests {
     fn what_is_no_number_is_named() {
         /// What makes a step unusable, and how the error begins.
         type Spoiled<'a> = (fn(&mut ChannelStep), &'a str);
-        let spoil: [Spoiled; 6] = [
+        let spoil: [Spoiled; 7] = [
             (
                 |s| s.given_others.code_m = f64::NAN,
                 "innovation (m) is NaN",
@@ -398,6 +449,10 @@ mod tests {
             ),
             (|s| s.cn0_dbhz = f64::NAN, "C/N0 (dB-Hz) is NaN"),
             (|s| s.cn0_now_hz = f64::NAN, "C/N0 now (Hz) is NaN"),
+            (
+                |s| s.others_change.now_db = f64::NAN,
+                "change of the others' C/N0 (dB) is NaN",
+            ),
             (
                 |s| s.tap_ratios = Some([0.75, f64::NAN]),
                 "ratio of taps is NaN",

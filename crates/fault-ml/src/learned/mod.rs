@@ -10,6 +10,7 @@
 mod activation;
 mod calibration;
 mod card;
+mod common;
 mod csv;
 mod dataset;
 mod error;
@@ -30,6 +31,7 @@ mod windows;
 
 pub use calibration::{Calibration, sigmoid};
 pub use card::{Card, FORMAT, Mode, ModelKind, VERSION};
+pub use common::{ChannelStrength, CommonStrength, StrengthChange};
 pub use csv::{read_csv, write_csv};
 pub use dataset::{Dataset, Label, LabelledStep, Sequence, Split};
 pub use error::LearnedError;

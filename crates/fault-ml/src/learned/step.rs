@@ -1,5 +1,6 @@
 //! What a learned monitor sees of a channel at one step.
 
+use super::StrengthChange;
 use crate::Innovation;
 
 /// One channel at one update of the navigation filter.
@@ -15,6 +16,8 @@ pub struct ChannelStep {
     pub cn0_dbhz: f64,
     /// C/N0 by the last integration alone, Hz; noise may take it below zero.
     pub cn0_now_hz: f64,
+    /// By how much the C/N0 of the other channels has changed, as [`CommonStrength`](super::CommonStrength) says.
+    pub others_change: StrengthChange,
     /// Early and late correlator sums over prompt, in phase with it, since the last step, where there are any.
     pub tap_ratios: Option<[f64; 2]>,
 }
@@ -35,6 +38,7 @@ impl ChannelStep {
             given_others: innovation,
             cn0_dbhz: 45.0,
             cn0_now_hz: 3e4,
+            others_change: StrengthChange::default(),
             tap_ratios: Some([0.75; 2]),
         }
     }

@@ -28,7 +28,8 @@ pub struct ChannelEpoch {
     pub doppler_variance_hz2: f64,
     /// How long before the epoch a steered channel's Doppler holds, s; zero where it is carried there.
     pub doppler_age_s: f64,
-    /// Where the Doppler of a steered channel had to lie to be told; `None`: anywhere.
+    /// Where the Doppler of a steered channel had to lie to be relied on; `None` where that is not limited: of a locked
+    /// carrier, and of a channel that nobody steers.
     pub doppler_reach: Option<DopplerReach>,
     /// Integral of the Doppler since the channel's start, cycles.
     pub doppler_cycles: f64,
@@ -52,17 +53,17 @@ pub struct ChannelEpoch {
     pub frequency_error_hz: f64,
 }
 
-/// What a frequency discriminator tells: further from the oscillator a Doppler is taken for another one.
+/// How far from the oscillator a frequency discriminator is relied on: half of what it takes for another frequency.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DopplerReach {
-    /// Doppler of the oscillator, Hz.
+    /// Doppler of the oscillator, Hz, above zero when approaching.
     pub oscillator_hz: f64,
     /// How far from it, Hz.
     pub width_hz: f64,
 }
 
 impl DopplerReach {
-    /// Whether a signal of `doppler_hz` is told from others.
+    /// Whether a signal of `doppler_hz`, above zero when approaching, is measured as what it is.
     #[must_use]
     pub fn holds(&self, doppler_hz: f64) -> bool {
         (doppler_hz - self.oscillator_hz).abs() <= self.width_hz
@@ -89,7 +90,7 @@ pub(super) struct EpochValues {
 impl EpochValues {
     /// Where the Doppler had to lie to be told, above zero when approaching where `sign` is that of the spectrum.
     pub(super) fn reach(&self, sign: f64) -> Option<DopplerReach> {
-        self.reach_hz.is_finite().then(|| DopplerReach {
+        self.reach_hz.is_finite().then_some(DopplerReach {
             oscillator_hz: sign * (self.doppler_hz - self.frequency_error_hz),
             width_hz: self.reach_hz,
         })

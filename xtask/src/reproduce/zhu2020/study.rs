@@ -85,7 +85,7 @@ impl Study {
     /// # Errors
     /// Where a run or a training fails.
     pub fn run(level: Level, seeds: usize, lengths: &[usize], trainings: u64) -> Result<Self> {
-        let split = paper::learned_from(paper::Flight::Blocked, seeds)?;
+        let split = paper::lessons_of(paper::Flight::Blocked, seeds)?;
         let judging = seeds.div_ceil(2);
         let judges = paper::harvest(paper::Flight::Blocked, judging, paper::JUDGED_BY, level)?;
         let cells = curve(&split, &judges, lengths, trainings)?;

@@ -24,7 +24,7 @@ use crate::train::evaluate::{Examination, Examined, examine};
 use crate::train::fit::{FALSE_ALARMS_PER_HOUR, unbounded};
 use crate::train::harvest::{Product, Unwatched, harvest};
 use crate::train::plan::Series;
-use crate::train::quiet;
+use crate::train::quiet::{self, Peak};
 use crate::train::scoring::Examinee;
 
 /// Time between two steps, s.
@@ -35,6 +35,8 @@ const WINDOW: usize = 50;
 const LEAST_CHANNEL_HOURS: f64 = 1000.0;
 /// Channel-hours that thresholds are found on, for each that false alarms are counted in.
 const FOUND_BY_SHARE: f64 = 0.3;
+/// Channels with false alarms that are named.
+const ALARMED_NAMED: usize = 10;
 /// What thresholds are found for of the stated rate: by the handful of alarms due in those hours a rate is known to a
 /// factor of two.
 const FOUND_FOR_SHARE: f64 = 0.5;
@@ -57,6 +59,8 @@ pub struct Row {
     pub point: OperatingPoint,
     /// Its false alarms in the others.
     pub false_alarms: RateInterval,
+    /// Channels that they came from, the worst first.
+    pub alarmed: Vec<Peak>,
     /// The model with that threshold.
     model: Option<LearnedModel>,
 }
@@ -123,10 +127,12 @@ pub fn table(models: &Path, channel_hours: f64, scenarios: u32) -> Result<Table>
         unwatched: &unwatched,
     };
     let tested = counted_by.first().context("nothing was counted")?;
-    let by_theory = (theory, tested.rate(theory));
+    let by_theory = (theory, tested.scores.rate(theory));
     let mut rows = Vec::new();
     for ((subject, found), counted) in subjects.into_iter().zip(found_by).zip(counted_by) {
-        let point = found.operating_point(FOUND_FOR_SHARE * FALSE_ALARMS_PER_HOUR)?;
+        let point = found
+            .scores
+            .operating_point(FOUND_FOR_SHARE * FALSE_ALARMS_PER_HOUR)?;
         let model = subject.model.map(|model| {
             let mut card = model.card().clone();
             card.operating_point = point;
@@ -140,7 +146,8 @@ pub fn table(models: &Path, channel_hours: f64, scenarios: u32) -> Result<Table>
         rows.push(Row {
             examination: examine(subject.name, &examinee, examined, WINDOW, point.threshold)?,
             point,
-            false_alarms: counted.rate(point.threshold),
+            false_alarms: counted.scores.rate(point.threshold),
+            alarmed: counted.above(point.threshold),
             model,
         });
     }
@@ -247,6 +254,8 @@ impl Row {
         let mut figures = self.examination.figures();
         figures["threshold_from_channel_hours"] = json!(self.point.channel_hours);
         figures["false_alarms"] = json!(self.false_alarms.events);
+        let alarmed = self.alarmed.iter().map(Peak::to_string);
+        figures["false_alarms_of"] = json!(alarmed.collect::<Vec<_>>());
         figures["false_alarms_in_channel_hours"] = json!(self.false_alarms.hours);
         figures["false_alarms_per_hour"] = json!(self.false_alarms.per_hour);
         figures["false_alarms_per_hour_95"] =
@@ -285,6 +294,16 @@ impl fmt::Display for Table {
                 e.area_band.1,
                 e.balanced.value(),
                 e.balanced_steady.value()
+            )?;
+        }
+        for row in self.rows.iter().filter(|row| !row.alarmed.is_empty()) {
+            let worst = row.alarmed.iter().take(ALARMED_NAMED);
+            let worst: Vec<String> = worst.map(Peak::to_string).collect();
+            let (name, channels) = (&row.examination.name, row.alarmed.len());
+            writeln!(
+                f,
+                "\n{name} alarmed in {channels} of them: {}",
+                worst.join(", ")
             )?;
         }
         let (threshold, alarms) = &self.by_theory;

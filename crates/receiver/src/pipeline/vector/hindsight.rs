@@ -16,9 +16,11 @@ use super::filter::filter;
 use super::{VectorTracking, monitors, reach};
 use crate::ReceiverError;
 
-/// Oscillators are where the filter puts them, and what they measured elsewhere is past, so long after it was corrected,
-/// s: three of the longest intervals.
-const IN_PLACE_S: f64 = 0.06;
+/// Oscillators are where the filter puts them, and what they measured elsewhere is past, so many updates or bits after it
+/// was corrected: two, and nothing hangs on rounding.
+const IN_PLACE: f64 = 2.5;
+/// A bit, s.
+const BIT_S: f64 = 0.02;
 
 /// What was known before an epoch.
 #[derive(Debug, Clone)]
@@ -112,11 +114,6 @@ impl Hindsight {
         self.moved = true;
     }
 
-    /// Whether what is measured at `now` may be by oscillators that the filter put where it no longer is.
-    pub(super) fn was_corrected(&self, now: GpsTime) -> bool {
-        self.corrected.is_some_and(|at| now - at <= IN_PLACE_S)
-    }
-
     /// What the filter is `told` of at this epoch, of satellites that it used at the last.
     fn newly_faulty(&self, told: &[(SatelliteId, Disposition)]) -> Vec<(SatelliteId, Disposition)> {
         let Some(last) = self.epochs.back() else {
@@ -147,6 +144,13 @@ impl VectorTracking {
             shown: Vec::new(),
             told: Vec::new(),
         })
+    }
+
+    /// Whether what is measured at `now` may be by oscillators that the filter put where it no longer is.
+    pub(super) fn was_corrected(&self, now: GpsTime) -> bool {
+        let in_place_s = IN_PLACE * self.settings.interval_s.max(BIT_S);
+        let corrected = self.hindsight.corrected;
+        corrected.is_some_and(|at| now - at <= in_place_s)
     }
 
     fn before(&self) -> Before {
@@ -209,8 +213,10 @@ impl VectorTracking {
         self.filter.loosen_drift(taken.drift_variance_m2_s2)?;
         taken.accelerate(self.acceleration_mps2, &self.state().position_ecef_m);
         let mut innovations = self.filter.innovations(&taken.measurements)?;
-        if reach::close(&mut taken.measurements, &innovations, &taken.reaches) {
-            innovations = self.filter.innovations(&taken.measurements)?;
+        // A copy: it may be taken in yet again, without another satellite.
+        let mut measurements = taken.measurements.clone();
+        if reach::leave_out(&mut measurements, &innovations, &taken.reaches) {
+            innovations = self.filter.innovations(&measurements)?;
         }
         let given = self.deviations(&innovations)?;
         for (innovation, given) in innovations.satellites().iter().zip(&given) {

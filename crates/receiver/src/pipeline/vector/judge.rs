@@ -2,6 +2,7 @@
 
 use gnss_nav::SatelliteId;
 use gnss_nav::filter::{Disposition, GivenOthers, Innovations};
+use gnss_signal::tracking::Lock;
 
 use super::monitors::{self, deviations};
 use super::watch::Watch;
@@ -25,12 +26,16 @@ impl VectorTracking {
         members: &mut [Member],
     ) -> Result<(), ReceiverError> {
         let given = self.deviations(innovations)?;
+        let heard = members.iter().filter(|m| m.epoch.lock != Lock::Lost);
+        let heard = heard.map(|m| monitors::strength(m.satellite, &m.epoch));
+        self.strengths.follow(&heard.collect::<Vec<_>>());
         for (innovation, given) in innovations.satellites().iter().zip(&given) {
             let mut members = members.iter_mut();
             let Some(member) = members.find(|m| m.satellite == innovation.satellite) else {
                 continue;
             };
-            let step = monitors::step(innovation, given, &member.epoch);
+            let others_change = self.strengths.of_others(member.satellite.prn.into());
+            let step = monitors::step(innovation, given, &member.epoch, others_change);
             member.shown = Some(step);
             self.watch(innovation.satellite).hear(&step, member.shape)?;
         }

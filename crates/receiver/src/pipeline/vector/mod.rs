@@ -22,7 +22,7 @@ mod watch;
 
 use std::collections::BTreeMap;
 
-use fault_ml::learned::ChannelStep;
+use fault_ml::learned::{ChannelStep, CommonStrength};
 use gnss_nav::coarse_time::SnapshotSolution;
 use gnss_nav::filter::{
     Advice, Disposition, EpochGeometry, FaultLogic, FaultThresholds, Gate, Innovations, NavFilter,
@@ -148,6 +148,7 @@ pub(super) struct VectorTracking {
     monitors: Vec<Monitor>,
     faults: FaultLogic,
     scatter: Scatter,
+    strengths: CommonStrength,
     watches: BTreeMap<SatelliteId, Watch>,
     geometry: Option<EpochGeometry>,
     /// Channels whose message tells another time, at the last epoch.
@@ -188,6 +189,7 @@ impl VectorTracking {
             monitors,
             faults: FaultLogic::new(FaultThresholds::default())?,
             scatter: Scatter::new(),
+            strengths: CommonStrength::default(),
             watches: BTreeMap::new(),
             geometry: None,
             contradicting: 0,
@@ -393,8 +395,8 @@ impl VectorTracking {
             self.step_clock(&step, epoch)?;
             innovations = self.filter.innovations(measurements)?;
         }
-        let moved = self.hindsight.was_corrected(now.receive_time);
-        if moved && reach::close(&mut now.measurements, &innovations, &now.reaches) {
+        let corrected = self.was_corrected(now.receive_time);
+        if corrected && reach::leave_out(&mut now.measurements, &innovations, &now.reaches) {
             innovations = self.filter.innovations(&now.measurements)?;
         }
         self.show(&innovations, &mut epoch.members)?;

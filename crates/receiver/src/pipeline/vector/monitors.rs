@@ -1,6 +1,6 @@
 //! The monitors of a channel, whichever they are.
 
-use fault_ml::learned::{ChannelStep, LearnedMonitor};
+use fault_ml::learned::{ChannelStep, ChannelStrength, LearnedMonitor, StrengthChange};
 use fault_ml::{ChannelMonitor, ChannelVerdict, Innovation, InnovationTest};
 use gnss_nav::SatelliteId;
 use gnss_nav::filter::{
@@ -97,11 +97,21 @@ fn distance2(given: &GivenOthers) -> f64 {
     rate.max(given.code.normalised_squared())
 }
 
-/// What the monitors of a channel are shown of an epoch.
+/// The strength of a channel at an epoch.
+pub(super) fn strength(satellite: SatelliteId, epoch: &ChannelEpoch) -> ChannelStrength {
+    ChannelStrength {
+        satellite: satellite.prn.into(),
+        cn0_dbhz: epoch.cn0_dbhz,
+        cn0_now_hz: epoch.cn0_now_hz,
+    }
+}
+
+/// What the monitors of a channel are shown of an epoch by which the C/N0 of the others changed by `others_change`.
 pub(super) fn step(
     innovation: &SatelliteInnovation,
     given: &GivenOthers,
     epoch: &ChannelEpoch,
+    others_change: StrengthChange,
 ) -> ChannelStep {
     ChannelStep {
         satellite: innovation.satellite.prn.into(),
@@ -109,6 +119,7 @@ pub(super) fn step(
         given_others: of_others(given),
         cn0_dbhz: epoch.cn0_dbhz,
         cn0_now_hz: epoch.cn0_now_hz,
+        others_change,
         tap_ratios: epoch.tap_ratios,
     }
 }

@@ -39,6 +39,7 @@ fn contradicts(step: &ChannelStep) -> bool {
 #[cfg(test)]
 mod tests {
     use fault_ml::Innovation;
+    use fault_ml::learned::StrengthChange;
     use gnss_nav::SatelliteState;
     use gnss_nav::{GpsTime, Measurement};
     use nalgebra::Vector3;
@@ -77,6 +78,7 @@ mod tests {
                 given_others: innovation(of_others_mps, 0.025),
                 cn0_dbhz: 40.0,
                 cn0_now_hz: 1e4,
+                others_change: StrengthChange::default(),
                 tap_ratios: None,
             }
         };

@@ -9,9 +9,12 @@ use gnss_nav::filter::Innovations;
 use gnss_nav::{Measurement, SatelliteId};
 use gnss_signal::tracking::DopplerReach;
 
+/// What is expected has to be certain to this part of what is told, one deviation, to say that something lay beyond.
+const CERTAIN: f64 = 0.5;
+
 /// Takes range rates out of `measurements` that lay out of reach if what `innovations` expect is true, and says whether
-/// there were any.
-pub(super) fn close(
+/// there were any. Oscillators are compared as they were when they measured, before the epoch: at 1 g a hertz or two.
+pub(super) fn leave_out(
     measurements: &mut [Measurement],
     innovations: &Innovations,
     reaches: &[(SatelliteId, DopplerReach)],
@@ -27,8 +30,9 @@ pub(super) fn close(
         };
         let of = measurements.iter_mut().find(|m| m.satellite == satellite);
         let Some(measurement) = of else { continue };
-        let expected_mps = measurement.range_rate_mps - rate.value();
-        if !reach.holds(-expected_mps / L1_WAVELENGTH_M) {
+        let expected_hz = (rate.value() - measurement.range_rate_mps) / L1_WAVELENGTH_M;
+        let sigma_hz = (rate.variance() - rate.noise_variance()).sqrt() / L1_WAVELENGTH_M;
+        if sigma_hz <= CERTAIN * reach.width_hz && !reach.holds(expected_hz) {
             measurement.range_rate_variance_m2 = f64::INFINITY;
             any = true;
         }
@@ -55,7 +59,10 @@ mod tests {
             clock_bias_m: 0.0,
             clock_drift_mps: 0.0,
         };
-        let filter = BatchFilter::new(state, Covariance::identity(), FilterSettings::default());
+        let knowing = |sigma: f64| {
+            let covariance = Covariance::identity() * sigma * sigma;
+            BatchFilter::new(state, covariance, FilterSettings::default()).unwrap()
+        };
         let measurement = |prn, range_rate_mps| Measurement {
             satellite: SatelliteId::gps(prn),
             receive_time: time,
@@ -78,7 +85,7 @@ mod tests {
             measurement(9, -109.5),
             measurement(16, -90.5),
         ];
-        let innovations = filter.unwrap().innovations(&measurements).unwrap();
+        let innovations = knowing(0.5).innovations(&measurements).unwrap();
         let reach = |prn, oscillator_hz| {
             let width_hz = 12.5;
             let reach = DopplerReach {
@@ -88,9 +95,11 @@ mod tests {
             (SatelliteId::gps(prn), reach)
         };
         let near = [reach(3, 536.0), reach(9, 515.0), reach(16, 525.0)];
-        assert!(!close(&mut measurements, &innovations, &near));
+        assert!(!leave_out(&mut measurements, &innovations, &near));
         let far = [reach(3, 536.0), reach(9, 566.0), reach(16, 485.0)];
-        assert!(close(&mut measurements, &innovations, &far));
+        let unsure = knowing(1.0).innovations(&measurements).unwrap();
+        assert!(!leave_out(&mut measurements, &unsure, &far));
+        assert!(leave_out(&mut measurements, &innovations, &far));
         let heard = measurements.map(|m| m.range_rate_variance_m2.is_finite());
         assert_eq!(heard, [true, false, false]);
     }
