@@ -34,9 +34,9 @@ pub enum FeatureSet {
     /// Both given the other channels, over their predicted deviations; running means of them and of their squares
     /// over their own deviations (a small error that lasts stands out there); C/N0, the same against what the
     /// channel is used to, and that of the last integration against the smoothed one, which answers at once, the
-    /// last two less what they are for the other channels; running means of the ratio metric, early plus late over twice prompt,
-    /// against what the channel is used to, over their own deviations. Of large numbers the inverse hyperbolic sine: they
-    /// keep their order without drowning the others.
+    /// last two less what they are for the other channels; running means of the ratio metric, early plus late over
+    /// twice prompt, against what the channel is used to, over their own deviations. Of large numbers the inverse
+    /// hyperbolic sine: they keep their order without drowning the others.
     Full,
 }
 
