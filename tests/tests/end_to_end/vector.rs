@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a failure here is a failed test")]
 
 use receiver::pipeline::{Settings, VectorSettings};
-use receiver::record::{EventKind, Lock, LoopMembership, Status};
+use receiver::record::{ChannelRecord, EventKind, Lock, LoopMembership, Status};
 use xtask::judged::{Judged, JudgedEpoch, receive, rms, settings};
 use xtask::scenario::built::Scenario;
 use xtask::scenario::catalogue;
@@ -276,6 +276,24 @@ fn an_oscillator_with_much_white_noise_leads_no_channel_astray() {
             "{tow_s}"
         );
     }
+}
+
+#[test]
+fn monitors_hear_nothing_before_time_is_exact() {
+    let overrides = ["duration_s=6.0", "receiver={assisted=true}"];
+    let judged = run(&scenario("static-open-sky", &overrides, Some(1)));
+    let is_steered = |c: &&ChannelRecord| c.innovation_code_m.is_some();
+    let began = judged.channels.iter().find(is_steered).unwrap().time_s;
+    let heard = judged.channels.iter().find(|c| c.shown.is_some());
+    let heard = heard.unwrap().time_s;
+    // Before any bit boundary is known, and once most are.
+    assert!(began < 0.3 && heard > 0.5, "{began} s, {heard} s");
+    let early = judged.channels.iter().filter(|c| c.time_s < heard);
+    assert!(early.clone().all(|c| c.scores.is_empty()));
+    assert!(early.filter(is_steered).count() > 10);
+    let late = judged.channels.iter().filter(|c| c.time_s > heard + 1.0);
+    assert!(late.clone().all(|c| c.shown.is_some()));
+    assert!(late.clone().count() > 100 && late.clone().all(|c| !c.scores.is_empty()));
 }
 
 #[test]

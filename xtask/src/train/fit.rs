@@ -20,7 +20,7 @@ use super::scoring::Examinee;
 pub const FALSE_ALARMS_PER_HOUR: f64 = 0.01;
 /// Offsets of the evidence that are tried, log-odds, and the most that counts of a step.
 const OFFSETS: [f64; 4] = [0.0, 0.5, 1.0, 2.0];
-const MOST: [f64; 4] = [1.0, 2.0, 4.0, 100.0];
+const MOST: [f64; 3] = [1.0, 2.0, 4.0];
 /// A fault that is not found counts as found after so long, s.
 const MISSED_S: f64 = 10.0;
 /// Windows that the calibration is fitted to.
@@ -65,16 +65,16 @@ impl Recipe {
             mode: Mode::Window,
             decide_every: 1,
             interval_s: 0.02,
-            windows: 4000,
+            windows: 8000,
             length: 1,
             svm: SvmTraining {
                 cost: 1.0,
+                relative_gamma: 0.3,
                 ..SvmTraining::default()
             },
             lstm: LstmTraining {
-                epochs: 8,
-                patience: 3,
-                learning_rate: 3e-3,
+                epochs: 2,
+                learning_rate: 2e-3,
                 ..LstmTraining::default()
             },
             seed: 1,
@@ -84,7 +84,7 @@ impl Recipe {
             ModelKind::Lstm => Self {
                 window: 50,
                 mode: Mode::Streaming,
-                windows: 20_000,
+                windows: 80_000,
                 length: 100,
                 ..base
             },

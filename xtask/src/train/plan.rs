@@ -72,13 +72,13 @@ impl Series {
     };
     /// What thresholds are found and false alarms counted by.
     pub const HEALTHY: Self = Self {
-        seed: 13,
-        week: 2539,
+        seed: 15,
+        week: 2555,
     };
     /// What is judged by.
     pub const TEST: Self = Self {
-        seed: 14,
-        week: 2547,
+        seed: 16,
+        week: 2563,
     };
     /// What models are tested on that have not learned from all there is.
     pub const GENERALISATION: Self = Self {

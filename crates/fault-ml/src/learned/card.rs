@@ -10,7 +10,7 @@ use super::{Evidence, EvidenceRule, FeatureSet, LearnedError};
 /// What a card says it is.
 pub const FORMAT: &str = "channel-monitor";
 /// Version of the format that this program writes and reads.
-pub const VERSION: u64 = 5;
+pub const VERSION: u64 = 6;
 
 /// Which kind of model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]

@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use super::feature::{DECADE_DB, USUAL_SHARE, strength};
+use super::feature::{DECADE_DB, strength};
+use super::usual::Usual;
 
 /// Fewest other channels that tell what is common to all.
 const FEWEST_OTHERS: usize = 3;
@@ -31,7 +32,7 @@ pub struct StrengthChange {
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct CommonStrength {
     /// By satellite, in tens of decibels about 40 dB-Hz.
-    usual: BTreeMap<u32, f64>,
+    usual: BTreeMap<u32, Usual>,
     changes: BTreeMap<u32, StrengthChange>,
 }
 
@@ -45,10 +46,11 @@ impl CommonStrength {
             let Ok((cn0, power)) = strength(channel.cn0_dbhz, channel.cn0_now_hz) else {
                 continue;
             };
-            let usual = self.usual.entry(channel.satellite).or_insert(cn0);
-            *usual += USUAL_SHARE * (cn0 - *usual);
+            let usual = self.usual.entry(channel.satellite);
+            let usual = usual.or_insert(Usual::NEW);
+            usual.follow(cn0, 0.0);
             let change = StrengthChange {
-                smoothed_db: DECADE_DB * (cn0 - *usual),
+                smoothed_db: DECADE_DB * (cn0 - usual.value()),
                 now_db: DECADE_DB * power,
             };
             self.changes.insert(channel.satellite, change);
@@ -95,10 +97,18 @@ mod tests {
         (1..).zip(cn0_dbhz).map(strength).collect()
     }
 
+    /// After a long time with this C/N0.
+    fn used_to(cn0_dbhz: &[f64]) -> CommonStrength {
+        let mut common = CommonStrength::default();
+        for _ in 0..1000 {
+            common.follow(&channels(cn0_dbhz));
+        }
+        common
+    }
+
     #[test]
     fn what_all_lose_is_common_and_what_one_loses_is_its_own() {
-        let mut common = CommonStrength::default();
-        common.follow(&channels(&[50.0, 48.0, 40.0, 45.0, 36.0]));
+        let mut common = used_to(&[50.0, 48.0, 40.0, 45.0, 36.0]);
         for satellite in 1..6 {
             let others = common.of_others(satellite);
             assert_eq!(others.smoothed_db, 0.0);
@@ -137,8 +147,7 @@ mod tests {
         common.follow(&channels(&[45.0; 3]));
         common.follow(&channels(&[35.0; 3]));
         assert_eq!(common.of_others(1), nothing);
-        let mut common = CommonStrength::default();
-        common.follow(&channels(&[45.0, 45.0, 45.0, f64::NAN]));
+        let mut common = used_to(&[45.0, 45.0, 45.0, f64::NAN]);
         common.follow(&channels(&[35.0, 35.0, 35.0, f64::NAN]));
         assert_eq!(common.of_others(1), nothing);
         assert!(common.of_others(4).smoothed_db < -9.0);

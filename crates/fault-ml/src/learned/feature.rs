@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::ChannelStep;
+use super::usual::Usual;
 use crate::error::within;
 use crate::{Innovation, MonitorError};
 
@@ -17,8 +18,8 @@ const RATE_SHARE: f64 = 0.08;
 const SQUARE_SHARE: f64 = 0.1;
 /// Weights of the newest step in the running means of the taps' ratio (memories of 10 and 50 steps).
 const SHAPE_SHARES: [f64; 2] = [0.2, 0.04];
-/// Weight of the newest step in the C/N0, and in the ratio of taps, that a channel is used to: 500 steps, ten seconds.
-pub(super) const USUAL_SHARE: f64 = 0.002;
+/// Within these a ratio of taps tells of a peak; beyond, of a prompt sum that noise left little of.
+const SHAPES: (f64, f64) = (0.0, 2.0);
 /// Length of a step for the noise of the taps' ratio, s.
 const STEP_S: f64 = 0.02;
 /// C/N0 that counts as zero, dB-Hz, and what counts as one, dB.
@@ -84,41 +85,38 @@ pub struct FeatureTrack {
     /// Of code and range rate, less one.
     squares: [f64; 2],
     /// C/N0 that the channel is used to, about 40 dB-Hz, in tens of decibels.
-    usual_cn0: Option<f64>,
+    usual_cn0: Usual,
     shape: Shape,
 }
 
 /// The ratio metric: early plus late over twice prompt.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Shape {
-    /// What the channel is used to; the first steps' mean at first.
-    usual: f64,
-    steps: f64,
+    usual: Usual,
     /// Running means of what it deviates, in deviations of a step.
     means: [f64; 2],
 }
 
 impl Shape {
     const NEW: Self = Self {
-        usual: 0.0,
-        steps: 0.0,
+        usual: Usual::NEW,
         means: [0.0; 2],
     };
 
     fn follow(&mut self, ratios: [f64; 2], cn0_dbhz: f64) {
-        let ratio = (ratios[0] + ratios[1]) / 2.0;
-        self.steps += 1.0;
-        if self.steps > 1.0 {
+        let ratio = ((ratios[0] + ratios[1]) / 2.0).clamp(SHAPES.0, SHAPES.1);
+        if !self.usual.is_new() {
             // Of a triangle of height one at distance r: noise of early plus late given prompt.
-            let height = self.usual.clamp(0.05, 0.95);
+            let usual = self.usual.value();
+            let height = usual.clamp(0.05, 0.95);
             let snr = STEP_S * 10_f64.powf(cn0_dbhz / 10.0);
             let sigma = (height * (1.0 - height) / (2.0 * snr)).sqrt();
-            let deviation = normalised((ratio - self.usual, sigma));
+            let deviation = normalised((ratio - usual, sigma));
             for (mean, share) in self.means.iter_mut().zip(SHAPE_SHARES) {
                 *mean += share * (deviation - *mean);
             }
         }
-        self.usual += USUAL_SHARE.max(1.0 / self.steps) * (ratio - self.usual);
+        self.usual.follow(ratio, 0.0);
     }
 }
 
@@ -131,7 +129,7 @@ impl FeatureTrack {
             code: [0.0; 2],
             rate: 0.0,
             squares: [0.0; 2],
-            usual_cn0: None,
+            usual_cn0: Usual::NEW,
             shape: Shape::NEW,
         }
     }
@@ -189,7 +187,7 @@ impl FeatureTrack {
             (self.rate / spread(RATE_SHARE)).asinh(),
             (rate_square / spread(SQUARE_SHARE)).asinh(),
             cn0,
-            cn0 - self.usual_cn0.unwrap_or(cn0) - others_cn0,
+            cn0 - self.usual_cn0.value() - others_cn0,
             power - others_power,
             (shape / spread(shape_share)).asinh(),
             (lasting_shape / spread(lasting_share)).asinh(),
@@ -209,9 +207,7 @@ impl FeatureTrack {
                 *mean += SQUARE_SHARE * (value * value - 1.0 - *mean);
             }
         }
-        // One that begins while all are weaker was stronger before, as the others were.
-        let usual = self.usual_cn0.get_or_insert(cn0 - others_cn0);
-        *usual += USUAL_SHARE * (cn0 - *usual);
+        self.usual_cn0.follow(cn0, others_cn0);
     }
 }
 
@@ -339,16 +335,18 @@ mod tests {
             };
             step
         };
-        let after = |steps: &[ChannelStep]| {
+        let after = |used_to: usize, last: ChannelStep| {
             let mut track = FeatureTrack::new(FeatureSet::Full);
-            let all = steps.iter().map(|step| track.next(step).unwrap());
-            let last = all.last().unwrap();
-            [8, 9].map(|k| f64::from(last.values()[k]))
+            for _ in 0..used_to {
+                track.next(&fallen(0.0, 0.0)).unwrap();
+            }
+            let features = track.next(&last).unwrap();
+            [8, 9].map(|k| f64::from(features.values()[k]))
         };
-        let before = after(&[fallen(0.0, 0.0)]);
-        let alone = after(&[fallen(0.0, 0.0), fallen(-6.0, 0.0)]);
-        let together = after(&[fallen(0.0, 0.0), fallen(-6.0, -6.0)]);
-        let begun = after(&[fallen(-6.0, -6.0)]);
+        let before = after(1000, fallen(0.0, 0.0));
+        let alone = after(1000, fallen(-6.0, 0.0));
+        let together = after(1000, fallen(-6.0, -6.0));
+        let begun = after(0, fallen(-6.0, -6.0));
         for (k, name) in ["smoothed", "now"].into_iter().enumerate() {
             // Of the last integration a little is noise: 0.02 of 60 at this C/N0.
             assert!(
@@ -361,6 +359,25 @@ mod tests {
             );
             assert!((begun[k] - before[k]).abs() < 0.05, "{name} {begun:?}");
         }
+    }
+
+    #[test]
+    fn what_is_usual_is_no_matter_of_one_step() {
+        let mut track = FeatureTrack::new(FeatureSet::Full);
+        let usual = ChannelStep::normal(1, 0.0, 0.0);
+        let mut weak = usual;
+        weak.cn0_dbhz -= 3.0;
+        let mut no_prompt = usual;
+        no_prompt.tap_ratios = Some([1e6; 2]);
+        let steps = [weak].into_iter().chain([usual; 1000]);
+        let steps = steps.chain([no_prompt]).chain([usual; 200]);
+        let rows: Vec<Features> = steps.map(|step| track.next(&step).unwrap()).collect();
+        // A fiftieth of 3 dB.
+        assert!(rows[50].values()[8].abs() < 0.01, "{:?}", rows[50]);
+        // A weight of 1/500 of a ratio of 2 in place of 0.75 is a fifth of the deviation of a step, and that of the mean a
+        // seventh.
+        let shape = f64::from(rows[1201].values()[11]).sinh();
+        assert!(shape.abs() < 1.5, "{shape}");
     }
 
     #[test]

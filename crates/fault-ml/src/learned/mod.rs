@@ -27,6 +27,7 @@ mod scaler;
 mod step;
 pub mod svm;
 mod tensors;
+mod usual;
 mod windows;
 
 pub use calibration::{Calibration, sigmoid};

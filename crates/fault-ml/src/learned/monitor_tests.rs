@@ -98,7 +98,7 @@ fn files_that_are_no_models_are_refused_by_what_is_wrong() {
     refused(
         &weights,
         &with("version", json!(VERSION + 1)),
-        "model card: version is 6: expected 5",
+        &format!("model card: version is {}: expected {VERSION}", VERSION + 1),
     );
     refused(
         &weights,

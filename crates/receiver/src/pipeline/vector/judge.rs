@@ -6,7 +6,7 @@ use gnss_signal::tracking::Lock;
 
 use super::monitors::{self, deviations};
 use super::watch::Watch;
-use super::{Epoch, Member, READMIT_S, VectorTracking, report, too_few};
+use super::{Epoch, Member, READMIT_S, Time, VectorTracking, report, too_few};
 use crate::ReceiverError;
 use crate::pipeline::belief::Change;
 use crate::record::EventKind;
@@ -19,7 +19,9 @@ impl VectorTracking {
             .or_insert_with(|| Watch::new(self.monitors.clone(), clean))
     }
 
-    /// Shows every monitor its satellite's innovations.
+    /// Shows every monitor its satellite's innovations, once time is exact: an error of the coarse time moves every
+    /// range by what its satellite comes nearer meanwhile, metres for tens of milliseconds, and none of them is
+    /// faulty.
     pub(super) fn show(
         &mut self,
         innovations: &Innovations,
@@ -29,6 +31,9 @@ impl VectorTracking {
         let heard = members.iter().filter(|m| m.epoch.lock != Lock::Lost);
         let heard = heard.map(|m| monitors::strength(m.satellite, &m.epoch));
         self.strengths.follow(&heard.collect::<Vec<_>>());
+        if self.time() == Time::Coarse {
+            return Ok(());
+        }
         for (innovation, given) in innovations.satellites().iter().zip(&given) {
             let mut members = members.iter_mut();
             let Some(member) = members.find(|m| m.satellite == innovation.satellite) else {
