@@ -154,7 +154,7 @@ enum Validation {
         #[arg(long, value_name = "DIR", default_value = "assets/models")]
         models: PathBuf,
         /// Healthy channel-hours that false alarms are counted in, reckoned with nine channels a run, of which about seven
-        /// come; thresholds are found in 0.3 times as many others
+        /// come; thresholds are found in 0.75 times as many others
         #[arg(long, value_name = "H", default_value_t = 1400.0)]
         hours: f64,
         /// Scenarios with faults

@@ -72,13 +72,13 @@ impl Series {
     };
     /// What thresholds are found and false alarms counted by.
     pub const HEALTHY: Self = Self {
-        seed: 15,
-        week: 2555,
+        seed: 17,
+        week: 2571,
     };
     /// What is judged by.
     pub const TEST: Self = Self {
-        seed: 16,
-        week: 2563,
+        seed: 18,
+        week: 2579,
     };
     /// What models are tested on that have not learned from all there is.
     pub const GENERALISATION: Self = Self {

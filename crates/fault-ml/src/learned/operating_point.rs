@@ -6,8 +6,10 @@ use super::LearnedError;
 use crate::error::within;
 use crate::metrics::RateInterval;
 
-/// Largest score of healthy channels that the tail is fitted to: this share of the alarms' number.
+/// Largest scores of healthy channels that the tail is fitted to.
 const TAIL_PEAKS: usize = 40;
+/// Alarms due from which on a threshold is what they lie above: it needs no tail.
+const ENOUGH_DUE: f64 = 3.0;
 
 /// Healthy runs of scores, step by step.
 #[derive(Debug, Clone, Default)]
@@ -63,7 +65,7 @@ impl HealthyScores {
         RateInterval::poisson(alarms, self.hours)
     }
 
-    /// The threshold that `per_hour` false alarms an hour exceed. Where fewer than 40 are due in what was
+    /// The threshold that `per_hour` false alarms an hour exceed. Where fewer than three are due in what was
     /// seen, the largest 40 peaks are continued by a tail: an estimate, to be confirmed.
     ///
     /// # Errors
@@ -81,7 +83,7 @@ impl HealthyScores {
         sorted.sort_by(|a, b| b.total_cmp(a));
         let due = per_hour * self.hours;
         let extrapolated = due < 1.0;
-        let threshold = if due >= TAIL_PEAKS as f64 {
+        let threshold = if due >= ENOUGH_DUE {
             sorted
                 .get(due as usize)
                 .copied()

@@ -34,7 +34,7 @@ const WINDOW: usize = 50;
 /// Channel-hours in which a rate of 0.01 an hour shows: ten false alarms.
 const LEAST_CHANNEL_HOURS: f64 = 1000.0;
 /// Channel-hours that thresholds are found on, for each that false alarms are counted in.
-const FOUND_BY_SHARE: f64 = 0.3;
+const FOUND_BY_SHARE: f64 = 0.75;
 /// Channels with false alarms that are named.
 const ALARMED_NAMED: usize = 10;
 /// What thresholds are found for of the stated rate: by the handful of alarms due in those hours a rate is known to a
@@ -104,7 +104,7 @@ fn subjects(models: &Path, test: InnovationTest) -> Result<Vec<Subject>> {
 }
 
 /// Examines the innovation test and the models in `models`: false alarms in `channel_hours` healthy channel-hours at
-/// thresholds that 0.3 times as many others give; everything else from `scenarios` scenarios that nothing was chosen by.
+/// thresholds that 0.75 times as many others give; everything else from `scenarios` scenarios that nothing was chosen by.
 ///
 /// # Errors
 /// Where a model cannot be read or a run fails.
