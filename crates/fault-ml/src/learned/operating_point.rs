@@ -29,7 +29,7 @@ pub struct OperatingPoint {
     pub false_alarms_per_hour: f64,
     /// Healthy channel-hours it was found on.
     pub channel_hours: f64,
-    /// Whether fewer than one alarm was due in them, so that the tail was drawn on.
+    /// Whether fewer than three alarms were due in them, so that a tail was drawn on.
     pub extrapolated: bool,
 }
 
@@ -82,8 +82,8 @@ impl HealthyScores {
         let mut sorted = self.peaks.clone();
         sorted.sort_by(|a, b| b.total_cmp(a));
         let due = per_hour * self.hours;
-        let extrapolated = due < 1.0;
-        let threshold = if due >= ENOUGH_DUE {
+        let extrapolated = due < ENOUGH_DUE;
+        let threshold = if !extrapolated {
             sorted
                 .get(due as usize)
                 .copied()
