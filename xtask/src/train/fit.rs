@@ -41,7 +41,7 @@ pub struct Recipe {
     pub decide_every: usize,
     /// Time between steps, s.
     pub interval_s: f64,
-    /// Windows trained on.
+    /// Windows trained on, half healthy and half faulty where there are so many.
     pub windows: usize,
     /// Steps of what is trained on: the window, or longer for a state that is carried.
     pub length: usize,
@@ -114,7 +114,7 @@ impl Recipe {
             ModelKind::Svm => {
                 let fit = self.svm.fit(&training)?;
                 let how = json!({
-                    "windows": training.len(), "cost": self.svm.cost, "relative_gamma": self.svm.relative_gamma,
+                    "windows": training.len(), "faulty_windows": training.faulty(), "cost": self.svm.cost, "relative_gamma": self.svm.relative_gamma,
                     "support_vectors": fit.predictor.count(), "support_vectors_before_pruning": fit.unpruned,
                 });
                 (Network::Svm(fit.predictor), how)
@@ -130,7 +130,7 @@ impl Recipe {
                 };
                 let fit = settings.fit(&training, &validation)?;
                 let how = json!({
-                    "windows": training.len(), "steps": self.length, "units": settings.hidden,
+                    "windows": training.len(), "faulty_windows": training.faulty(), "steps": self.length, "units": settings.hidden,
                     "seed": settings.seed, "batch": settings.batch, "learning_rate": settings.learning_rate,
                     "weight_decay": settings.weight_decay, "passes": fit.epochs,
                     "validation_loss_nats": fit.validation_loss,

@@ -72,13 +72,13 @@ impl Series {
     };
     /// What thresholds are found and false alarms counted by.
     pub const HEALTHY: Self = Self {
-        seed: 17,
-        week: 2571,
+        seed: 19,
+        week: 2587,
     };
     /// What is judged by.
     pub const TEST: Self = Self {
-        seed: 18,
-        week: 2579,
+        seed: 20,
+        week: 2595,
     };
     /// What models are tested on that have not learned from all there is.
     pub const GENERALISATION: Self = Self {

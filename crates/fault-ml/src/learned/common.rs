@@ -41,20 +41,29 @@ impl CommonStrength {
     pub fn follow(&mut self, channels: &[ChannelStrength]) {
         let is_here = |satellite: &u32| channels.iter().any(|c| c.satellite == *satellite);
         self.usual.retain(|satellite, _| is_here(satellite));
+        let passing: Vec<f64> = channels.iter().map(|c| self.befell(c.satellite)).collect();
         self.changes.clear();
-        for channel in channels {
+        for (channel, passing) in channels.iter().zip(passing) {
             let Ok((cn0, power)) = strength(channel.cn0_dbhz, channel.cn0_now_hz) else {
                 continue;
             };
             let usual = self.usual.entry(channel.satellite);
             let usual = usual.or_insert(Usual::NEW);
-            usual.follow(cn0, 0.0);
+            usual.follow(cn0, passing);
             let change = StrengthChange {
                 smoothed_db: DECADE_DB * (cn0 - usual.value()),
                 now_db: DECADE_DB * power,
             };
             self.changes.insert(channel.satellite, change);
         }
+    }
+
+    /// What befell all channels that were there before that of `satellite`, in tens of decibels.
+    fn befell(&self, satellite: u32) -> f64 {
+        let steps = |satellite| self.usual.get(satellite).map_or(0.0, Usual::steps);
+        let own = steps(&satellite);
+        let older = self.changes.iter().filter(|(s, _)| steps(s) > own);
+        median(older.map(|(_, change)| change.smoothed_db)) / DECADE_DB
     }
 
     /// By how much all channels but that of `satellite` have changed, in the median; by nothing where fewer than three
@@ -137,6 +146,21 @@ mod tests {
         let others = common.of_others(2);
         assert_eq!(others.smoothed_db, 0.0);
         assert_abs_diff_eq!(others.now_db, -10.0, epsilon = 0.1);
+    }
+
+    #[test]
+    fn channels_that_come_back_under_interference_do_not_hide_it() {
+        let mut common = used_to(&[45.0; 9]);
+        for _ in 0..50 {
+            common.follow(&channels(&[37.0; 4]));
+        }
+        for _ in 0..50 {
+            common.follow(&channels(&[37.0; 9]));
+        }
+        for satellite in [1, 9] {
+            let smoothed_db = common.of_others(satellite).smoothed_db;
+            assert!((-8.0..-6.0).contains(&smoothed_db), "{smoothed_db}");
+        }
     }
 
     #[test]

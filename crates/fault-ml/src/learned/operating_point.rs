@@ -14,7 +14,7 @@ const ENOUGH_DUE: f64 = 3.0;
 /// Healthy runs of scores, step by step.
 #[derive(Debug, Clone, Default)]
 pub struct HealthyScores {
-    /// Peaks of stretches above their neighbourhood: one alarm each, whatever the threshold below them.
+    /// Peaks that nothing near exceeds: one alarm each, whatever the threshold below them.
     peaks: Vec<f64>,
     hours: f64,
 }
@@ -34,15 +34,19 @@ pub struct OperatingPoint {
 }
 
 impl HealthyScores {
-    /// Takes the scores of one healthy channel, `interval_s` apart. Scores less than `apart` steps from a
-    /// larger one belong to the same alarm.
+    /// Takes the scores of one healthy channel, `interval_s` apart. Of every `apart` steps the largest counts, and only
+    /// where those of the steps before and after do not exceed it: they belong to the same alarm.
     pub fn add(&mut self, scores: &[f64], interval_s: f64, apart: usize) {
         self.hours += scores.len() as f64 * interval_s / 3600.0;
-        for block in scores.chunks(apart.max(1)) {
-            let peak = block.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-            if peak > f64::NEG_INFINITY {
-                self.peaks.push(peak);
+        let largest = |block: &[f64]| block.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let blocks: Vec<f64> = scores.chunks(apart.max(1)).map(largest).collect();
+        let mut before = f64::NEG_INFINITY;
+        for (number, peak) in blocks.iter().enumerate() {
+            let after = blocks.get(number + 1).unwrap_or(&f64::NEG_INFINITY);
+            if *peak > before && peak >= after {
+                self.peaks.push(*peak);
             }
+            before = *peak;
         }
     }
 
@@ -84,10 +88,9 @@ impl HealthyScores {
         let due = per_hour * self.hours;
         let extrapolated = due < ENOUGH_DUE;
         let threshold = if !extrapolated {
-            sorted
-                .get(due as usize)
-                .copied()
-                .unwrap_or(f64::NEG_INFINITY)
+            // Others exceed the k-th largest of n hours k times in as many, on average.
+            let last = (due as usize).saturating_sub(1);
+            sorted.get(last).copied().unwrap_or(f64::NEG_INFINITY)
         } else {
             let base = sorted.get(TAIL_PEAKS).copied().unwrap_or_default();
             base + tail_excess(sorted.iter().take(TAIL_PEAKS).map(|peak| peak - base), due)
@@ -142,9 +145,29 @@ mod tests {
             );
             assert_eq!(point.extrapolated, per_hour < 0.1);
         }
-        let point = healthy.operating_point(10.0).unwrap();
-        let rate = healthy.rate(point.threshold);
-        assert!(rate.low < 10.0 && rate.high > 10.0, "{rate:?}");
+    }
+
+    #[test]
+    fn where_enough_are_due_the_last_of_them_is_the_threshold() {
+        let mut healthy = HealthyScores::default();
+        // 100 hours: peaks of 1 to 100, nothing between them.
+        let scores: Vec<f64> = (0..200_u32)
+            .map(|k| {
+                if k % 2 == 0 {
+                    0.0
+                } else {
+                    f64::from(k / 2 + 1)
+                }
+            })
+            .collect();
+        healthy.add(&scores, 1800.0, 1);
+        let point = healthy.operating_point(0.03).unwrap();
+        assert_eq!((point.threshold, point.extrapolated), (98.0, false));
+        assert_eq!(healthy.rate(point.threshold).events, 2);
+        assert_eq!(healthy.operating_point(0.0499).unwrap().threshold, 97.0);
+        assert!(healthy.operating_point(0.0299).unwrap().extrapolated);
+        // All others: 100 of 200 blocks are peaks.
+        assert_eq!(healthy.rate(0.0).events, 100);
     }
 
     #[test]
@@ -162,8 +185,10 @@ mod tests {
     fn exceedances_that_hang_together_are_one_alarm() {
         let mut healthy = HealthyScores::default();
         let mut scores = vec![0.0; 100];
-        scores[40..45].fill(9.0);
+        // Across the boundary of two blocks of ten.
+        scores[38..43].copy_from_slice(&[7.0, 8.0, 9.0, 8.0, 7.0]);
         healthy.add(&scores, 36.0, 10);
+        assert_eq!(healthy.rate(5.0).events, 1);
         assert_eq!(healthy.rate(5.0).per_hour, 1.0);
         assert!(healthy.operating_point(0.0).is_err());
         assert!(healthy.operating_point(1.0).is_err());

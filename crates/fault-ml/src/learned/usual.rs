@@ -31,6 +31,11 @@ impl Usual {
         self.value
     }
 
+    /// Steps taken in.
+    pub(super) const fn steps(&self) -> f64 {
+        self.steps
+    }
+
     /// Whether it has taken in nothing.
     pub(super) fn is_new(&self) -> bool {
         self.steps == 0.0

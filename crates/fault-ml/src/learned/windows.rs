@@ -40,9 +40,9 @@ pub fn cn0_class_dbhz(cn0_dbhz: f64) -> i64 {
     (CLASS_DB * (cn0_dbhz / CLASS_DB).round()) as i64
 }
 
-/// Ends of `count` windows of `length` steps: half faulty, half healthy; within each, evenly over how new the
-/// label is (changed within the window or not), the fault and the class of C/N0. Windows that no
-/// change of label is in are half a window apart: closer ones would nearly repeat each other.
+/// Ends of at most `count` windows of `length` steps: half faulty, half healthy, of each as many as there are; within
+/// each, evenly over how new the label is (changed within the window or not), the fault and the class of C/N0. Windows
+/// that no change of label is in are half a window apart: closer ones would nearly repeat each other.
 #[must_use]
 pub fn choose(data: &Dataset, length: usize, count: usize, seed: u64) -> Vec<WindowEnd> {
     let mut strata: BTreeMap<Stratum, Vec<WindowEnd>> = BTreeMap::new();
@@ -196,6 +196,12 @@ impl Windows {
     #[must_use]
     pub const fn len(&self) -> usize {
         self.labels.len()
+    }
+
+    /// How many are faulty.
+    #[must_use]
+    pub fn faulty(&self) -> usize {
+        self.labels.iter().filter(|l| l.is_faulty()).count()
     }
 
     /// Whether there are none.

@@ -1,13 +1,16 @@
 //! Scalar tracking of one signal: pull-in, loops, lock, bits, and the pre-filter.
 
+mod bit_sum;
 pub mod channel;
 pub mod cn0;
 pub mod discriminator;
 mod epoch;
+mod fade;
 mod lock;
 pub mod loop_filter;
 mod nco;
 mod noise;
+mod phase_slope;
 mod presence;
 mod pull_in;
 mod sample_grid;

@@ -5,12 +5,15 @@
 
 use num_complex::Complex64;
 
+use super::bit_sum::BitSum;
 use super::cn0;
 use super::discriminator::{EarlyPromptLate, FrequencyDiscriminator, PhaseDiscriminator};
-use super::epoch::{ChannelEpoch, EpochValues, Integration, PhaseLine, PreFilter, TapProducts};
+use super::epoch::{ChannelEpoch, EpochValues, Integration, PreFilter, TapProducts};
+use super::fade::{self, Fade};
 use super::lock::LockDetector;
 use super::loop_filter::{CarrierBandwidth, CarrierLoop, CodeLoop};
 use super::nco::Nco;
+use super::phase_slope::PhaseSlope;
 use super::presence::Presence;
 use super::sample_grid::with_taps;
 use super::steered::{BitsLate, Reception, Silence, Steered, SteeredSums, Steering};
@@ -19,11 +22,6 @@ use crate::Replica;
 
 /// Time constant of the smoothed C/N0, s.
 const CN0_TIME_S: f64 = 1.0;
-/// Weight of a new difference of Dopplers in the acceleration that carries them to the epoch.
-const ACCELERATION_GAIN: f64 = 0.2;
-
-/// Ratio of signal to noise in one integration from which a fade is told from noise.
-const STRONG_SNR: f64 = 20.0;
 
 /// Deviation of the code phase when carrier lock is lost, chips.
 const UNLOCKED_SIGMA_CHIPS: f64 = 0.05;
@@ -47,8 +45,6 @@ enum Helm {
 pub(super) struct Steady {
     pub(super) nco: Nco,
     settings: TrackingSettings,
-    /// First period that begins a bit, modulo the periods of a bit.
-    bit_edge: i64,
     carrier: CarrierLoop,
     helm: Helm,
     detector: LockDetector,
@@ -57,37 +53,13 @@ pub(super) struct Steady {
     cn0_now_hz: f64,
     tap_products: TapProducts,
     previous_prompt: Option<Complex64>,
-    bit: Bit,
+    bit: BitSum,
     pre_filter: PreFilter,
-    last_line: Option<PhaseLine>,
-    acceleration_hz_s: f64,
+    slope: PhaseSlope,
     prompt: Complex64,
     slipped: bool,
     fade: Fade,
 }
-
-/// The bit being summed.
-#[derive(Debug, Clone, Copy, Default)]
-struct Bit {
-    sum: Complex64,
-    periods: i64,
-}
-
-/// Successive integrations without the power that the C/N0 promises.
-#[derive(Debug, Clone, Copy, Default)]
-struct Fade {
-    since_tick: u64,
-    integrations: u32,
-    /// Whether the last of them held noise alone.
-    is_silent: bool,
-}
-
-/// A strong signal below this ratio in an integration is not there: what is left is noise.
-const SILENT_SNR: f64 = 4.0;
-
-/// After so many a steered channel takes its signal for gone, without waiting for the smoothed C/N0
-/// to fall. By chance so many happen once in 1e11.
-const FADE_IS_REAL: u32 = 5;
 
 impl Steady {
     /// Tracking from `nco`, on a signal of `cn0_hz` whose code phase has that variance.
@@ -101,7 +73,6 @@ impl Steady {
         Self {
             nco,
             settings,
-            bit_edge: nco.nearest_period().rem_euclid(bit_periods),
             carrier: CarrierLoop::new(settings.carrier_order, nco.doppler_hz),
             helm: Helm::Own(CodeLoop::new(code_variance_chips2)),
             detector: LockDetector::new(false),
@@ -110,10 +81,9 @@ impl Steady {
             cn0_now_hz: cn0_hz,
             tap_products: TapProducts::default(),
             previous_prompt: None,
-            bit: Bit::default(),
+            bit: BitSum::new(nco.nearest_period(), bit_periods),
             pre_filter: PreFilter::default(),
-            last_line: None,
-            acceleration_hz_s: 0.0,
+            slope: PhaseSlope::default(),
             prompt: Complex64::default(),
             slipped: true,
             fade: Fade::default(),
@@ -180,9 +150,8 @@ impl Steady {
         let Some(first) = self.nco.first_period_of_bit(steering) else {
             return;
         };
-        if first != self.bit_edge {
-            self.bit_edge = first;
-            self.bit = Bit::default();
+        if first != self.bit.edge() {
+            self.bit = BitSum::new(first, bit_periods(&self.nco));
             if let Helm::Navigation(steered) = &mut self.helm {
                 steered.forget_bits();
             }
@@ -199,24 +168,24 @@ impl Steady {
 
     /// Whether the signal stands well out of the noise of one integration.
     pub(super) fn is_strong(&self) -> bool {
-        self.cn0_hz * self.interval_s() > STRONG_SNR
+        fade::is_strong(self.cn0_hz, self.interval_s())
     }
 
     /// The tick at which the signal faded away while others say that it should be strong.
     pub(super) fn faded_since(&self) -> Option<u64> {
-        (self.fade.integrations > 0).then_some(self.fade.since_tick)
+        self.fade.since_tick()
     }
 
     /// Whether a strong signal has given way to noise: once is chance.
     pub(super) const fn is_silent(&self) -> bool {
-        self.fade.is_silent && self.fade.integrations > 1
+        self.fade.is_silent()
     }
 
     /// Next interval: up to a bit boundary or a whole integration after one.
     pub(super) fn replica(&self) -> Replica {
         let length = i64::from(self.integration_periods());
         let now = self.nco.nearest_period();
-        let end = now + length - (now - self.bit_edge).rem_euclid(length);
+        let end = now + length - (now - self.bit.edge()).rem_euclid(length);
         let spacing = self.settings.spacing_chips;
         let taps = crate::TapOffsets::early_prompt_late(spacing);
         let replica = self.nco.replica(self.nco.tick_of_period(end), taps);
@@ -254,7 +223,7 @@ impl Steady {
                 taps: *taps,
                 noise_variance,
                 periods,
-                start_period: start.nearest_period() - self.bit_edge,
+                start_period: start.nearest_period() - self.bit.edge(),
                 middle_s,
                 cycles,
             };
@@ -277,11 +246,12 @@ impl Steady {
                 frequency_error_hz: frequency_error,
             });
             // Noise alone would carry the oscillators away from where the signal may return.
-            if !self.fade.is_silent {
+            if !self.fade.holds_noise() {
                 self.steer_by_loops(phase_error, frequency_error, code_error, interval_s);
             }
         }
-        self.sum_bit(taps.prompt, periods)
+        self.bit
+            .add(taps.prompt, periods, self.nco.nearest_period())
     }
 
     /// Adds the sums of an integration to what the steered channel measures.
@@ -356,24 +326,11 @@ impl Steady {
         }
     }
 
-    /// Where the signal stands well out of the noise, a quarter of its power is no accident.
     fn watch_fade(&mut self, now_hz: f64, tick: u64) {
-        let faded = self.is_strong() && now_hz < 0.25 * self.cn0_hz;
-        let is_silent = now_hz * self.interval_s() < SILENT_SNR;
-        self.fade = match (faded, self.fade.integrations) {
-            (false, _) => Fade::default(),
-            (true, 0) => Fade {
-                since_tick: tick,
-                integrations: 1,
-                is_silent,
-            },
-            (true, n) => Fade {
-                integrations: n + 1,
-                is_silent,
-                ..self.fade
-            },
-        };
-        if self.fade.integrations == FADE_IS_REAL
+        self.fade
+            .watch(now_hz, self.cn0_hz, self.interval_s(), tick);
+        // Without waiting for the smoothed C/N0 to fall.
+        if self.fade.shows_it_gone()
             && self.settings.steered.silence == Silence::LeftOut
             && let Helm::Navigation(steered) = &mut self.helm
         {
@@ -415,22 +372,6 @@ impl Steady {
         }
     }
 
-    /// Adds to the bit and returns it where it is complete.
-    fn sum_bit(&mut self, prompt: Complex64, periods: i64) -> Option<NavBit> {
-        let bit_periods = bit_periods(&self.nco);
-        self.bit.sum += prompt;
-        self.bit.periods += periods;
-        let now = self.nco.nearest_period();
-        if (now - self.bit_edge).rem_euclid(bit_periods) != 0 {
-            return None;
-        }
-        let bit = std::mem::take(&mut self.bit);
-        (bit.periods == bit_periods).then(|| NavBit {
-            soft: bit.sum.re as f32,
-            code_period: (now - bit_periods).unsigned_abs(),
-        })
-    }
-
     /// Combines what has come since the previous epoch into one value at `tick`.
     pub(super) fn epoch(&mut self, tick: u64) -> ChannelEpoch {
         let mut at = self.nco;
@@ -443,9 +384,7 @@ impl Steady {
             tick,
             code_period: at.code_period,
             code_phase_chips: at.code_phase_chips,
-            periods_into_bit: Some(
-                (at.code_period - self.bit_edge).rem_euclid(bit_periods(&at)) as u8,
-            ),
+            periods_into_bit: Some(self.bit.periods_into_bit(at.code_period) as u8),
             code_variance_chips2: measured.code_variance_chips2,
             doppler_hz: sign * measured.doppler_hz,
             doppler_variance_hz2: measured.doppler_variance_hz2,
@@ -490,8 +429,8 @@ impl Steady {
                 }
             }
             Helm::Navigation(steered) => {
-                let silent =
-                    self.fade.integrations > 0 && self.settings.steered.silence == Silence::LeftOut;
+                let silent = self.fade.since_tick().is_some()
+                    && self.settings.steered.silence == Silence::LeftOut;
                 let values = steered.values(&self.settings.steered, &self.reception());
                 let values = values
                     .filter(|_| !silent)
@@ -542,8 +481,7 @@ impl Steady {
             .phase_line()
             .filter(|_| self.lock == Lock::Carrier);
         let Some(line) = line else {
-            self.last_line = None;
-            self.acceleration_hz_s = 0.0;
+            self.slope = PhaseSlope::default();
             let pair = (1.0 + 1.0 / snr) / snr / (std::f64::consts::TAU * interval_s).powi(2);
             if !self.settings.tracks_phase() {
                 // Successive frequency errors are differences of phases and cancel but for the last phase,
@@ -556,14 +494,9 @@ impl Steady {
             }
             return (self.nco.doppler_hz + frequency_error_hz, pair);
         };
-        if let Some(before) = self.last_line.replace(line) {
-            let slope = (line.slope_hz - before.slope_hz) / (line.middle_s - before.middle_s);
-            self.acceleration_hz_s += ACCELERATION_GAIN * (slope - self.acceleration_hz_s);
-        }
-        let ahead_s = tick as f64 / self.nco.front_end.sample_rate_hz - line.middle_s;
-        let phase = costas_variance_cycles2(snr);
-        let doppler_hz = line.slope_hz + self.acceleration_hz_s * ahead_s;
-        (doppler_hz, phase / line.spread_s2)
+        let time_s = tick as f64 / self.nco.front_end.sample_rate_hz;
+        let variance = costas_variance_cycles2(snr) / line.spread_s2;
+        (self.slope.doppler_hz(line, time_s), variance)
     }
 
     fn interval_s(&self) -> f64 {

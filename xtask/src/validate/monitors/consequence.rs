@@ -16,6 +16,7 @@ use crate::judged;
 use crate::order::quantile;
 use crate::reproduce::chart::{BLACK, BLUE, Chart, GREEN, RED, Series, Stroke, picture};
 use crate::scenario::built::Scenario;
+use crate::scenario::fault::Account;
 use crate::scenario::make::Level;
 use crate::train::evaluate::OnFault;
 use crate::train::plan::Plan;
@@ -86,10 +87,26 @@ struct Flown {
     epochs: Vec<Epoch>,
     /// The fault, and the time from its onset to the first exclusion of its satellite, s.
     fault: Option<(String, Option<f64>)>,
-    /// Satellites that nothing befell, excluded before the onset or in a run without a fault.
-    wrong: usize,
-    /// Signal before the onset, s.
-    healthy_s: f64,
+    wrong: Wrong,
+}
+
+/// Exclusions of satellites that no fault of their own had befallen.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+struct Wrong {
+    exclusions: usize,
+    signal_s: f64,
+    /// Those under interference with all reception, and how long there was such.
+    interfered: usize,
+    interfered_s: f64,
+}
+
+impl Wrong {
+    fn add(&mut self, other: Self) {
+        self.exclusions += other.exclusions;
+        self.signal_s += other.signal_s;
+        self.interfered += other.interfered;
+        self.interfered_s += other.interfered_s;
+    }
 }
 
 /// What came of all runs with one watch.
@@ -99,8 +116,7 @@ pub struct Consequence {
     pub label: &'static str,
     epochs: Vec<Epoch>,
     faults: BTreeMap<String, OnFault>,
-    wrong: usize,
-    healthy_s: f64,
+    wrong: Wrong,
 }
 
 /// Flies `plans` with each of `watches`, at the correlator level.
@@ -119,8 +135,7 @@ pub fn consequences(plans: &[Plan], watches: &[Watch]) -> Result<Vec<Consequence
             label: watch.label,
             epochs: Vec::new(),
             faults: BTreeMap::new(),
-            wrong: 0,
-            healthy_s: 0.0,
+            wrong: Wrong::default(),
         };
         for run in &flown {
             all.add(run.get(index).context("no run")?);
@@ -152,11 +167,6 @@ fn fly(plan: &Plan, scenario: &Scenario, watch: &Watch) -> Result<Flown> {
             .unwrap_or(false),
     });
     let excluded = |e: &&Event| matches!(e.kind, EventKind::Excluded { .. });
-    let wrong = judged
-        .events
-        .iter()
-        .filter(|e| excluded(e) && e.time_s < onset_s)
-        .count();
     let fault = own.map(|account| {
         let victims: &[SatelliteId] = &account.satellites;
         let found = judged
@@ -170,16 +180,38 @@ fn fly(plan: &Plan, scenario: &Scenario, watch: &Watch) -> Result<Flown> {
     Ok(Flown {
         epochs: epochs.collect(),
         fault,
-        wrong,
-        healthy_s: onset_s.min(plan.duration_s) - SETTLED_S,
+        wrong: wrong(&judged.events, &scenario.accounts, plan.duration_s),
     })
+}
+
+/// Exclusions before any fault, and of those that it does not befall.
+fn wrong(events: &[Event], accounts: &[Account], duration_s: f64) -> Wrong {
+    let begin_s = |account: &Account| account.span.begin_s;
+    let of_all = accounts.iter().find(|a| a.satellites.is_empty());
+    let interfered_from_s = of_all.map_or(f64::INFINITY, begin_s).min(duration_s);
+    let is_victim = |e: &&Event| {
+        let befalls = |a: &Account| e.satellite.is_some_and(|s| a.satellites.contains(&s));
+        accounts
+            .iter()
+            .any(|a| e.time_s >= begin_s(a) && befalls(a))
+    };
+    let excluded = events
+        .iter()
+        .filter(|e| matches!(e.kind, EventKind::Excluded { .. }));
+    let wrong = excluded.filter(|e| !is_victim(e));
+    let (interfered, quiet): (Vec<_>, Vec<_>) = wrong.partition(|e| e.time_s >= interfered_from_s);
+    Wrong {
+        exclusions: quiet.len(),
+        signal_s: interfered_from_s,
+        interfered: interfered.len(),
+        interfered_s: duration_s - interfered_from_s,
+    }
 }
 
 impl Consequence {
     fn add(&mut self, run: &Flown) {
         self.epochs.extend(&run.epochs);
-        self.wrong += run.wrong;
-        self.healthy_s += run.healthy_s;
+        self.wrong.add(run.wrong);
         if let Some((fault, delay_s)) = &run.fault {
             let on = self.faults.entry(fault.clone()).or_default();
             on.faults += 1;
@@ -215,7 +247,8 @@ impl Consequence {
         json!({
             "found": found, "faults": faults,
             "horizontal_m": { "p50": self.error_m(0.5), "p95": self.error_m(0.95), "p99": self.error_m(0.99) },
-            "misleading": self.misleading(), "wrongly_excluded": self.wrong, "healthy_s": self.healthy_s,
+            "misleading": self.misleading(), "wrongly_excluded": self.wrong.exclusions, "signal_s": self.wrong.signal_s,
+            "wrongly_excluded_under_interference": self.wrong.interfered, "interfered_s": self.wrong.interfered_s,
         })
     }
 }
@@ -274,21 +307,23 @@ impl fmt::Display for Table<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
             f,
-            "| watched by | faults found | horizontal error from the onset on, median, 95 %, 99 % (m) | beyond four deviations unsaid | wrong exclusions before |\n\
+            "| watched by | faults found | horizontal error from the onset on, median, 95 %, 99 % (m) | beyond four deviations unsaid | wrong exclusions; under interference |\n\
              |---|---|---|---|---|"
         )?;
         for row in self.0 {
             let (found, faults) = row.found();
             writeln!(
                 f,
-                "| {} | {found} of {faults} | {:.2}, {:.1}, {:.1} | {:.2} % | {} in {:.0} s |",
+                "| {} | {found} of {faults} | {:.2}, {:.1}, {:.1} | {:.2} % | {} in {:.0} s; {} in {:.0} s |",
                 row.label,
                 row.error_m(0.5),
                 row.error_m(0.95),
                 row.error_m(0.99),
                 100.0 * row.misleading(),
-                row.wrong,
-                row.healthy_s
+                row.wrong.exclusions,
+                row.wrong.signal_s,
+                row.wrong.interfered,
+                row.wrong.interfered_s
             )?;
         }
         write!(f, "\n| fault |")?;
@@ -306,5 +341,45 @@ impl fmt::Display for Table<'_> {
             writeln!(f)?;
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scenario::fault::Span;
+
+    #[test]
+    fn what_befell_no_fault_of_its_own_is_wrongly_excluded() {
+        let account = |satellites: &[u8], begin_s| Account {
+            kind: "step",
+            satellites: satellites
+                .iter()
+                .map(|prn| SatelliteId::gps(*prn))
+                .collect(),
+            span: Span {
+                begin_s,
+                end_s: None,
+                ramp_s: 0.0,
+            },
+            detail: String::new(),
+        };
+        let excluded = |prn, time_s| Event {
+            time_s,
+            satellite: Some(SatelliteId::gps(prn)),
+            kind: EventKind::Excluded {
+                monitor: "innovation".to_owned(),
+                score: 4.0,
+                threshold: 3.0,
+                residual_m: None,
+            },
+        };
+        let events = [excluded(7, 5.0), excluded(7, 30.0), excluded(8, 50.0)];
+        let of_one = wrong(&events, &[account(&[7], 20.0)], 60.0);
+        assert_eq!((of_one.exclusions, of_one.signal_s), (2, 60.0));
+        assert_eq!((of_one.interfered, of_one.interfered_s), (0, 0.0));
+        let of_all = wrong(&events, &[account(&[], 20.0)], 60.0);
+        assert_eq!((of_all.exclusions, of_all.signal_s), (1, 20.0));
+        assert_eq!((of_all.interfered, of_all.interfered_s), (2, 40.0));
     }
 }

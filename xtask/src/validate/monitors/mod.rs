@@ -235,11 +235,11 @@ impl Table {
         Ok(())
     }
 
-    /// Whether every rate of false alarms is one that the stated rate allows, by enough hours to tell.
+    /// Whether no monitor alarmed more often than the stated rate, in enough hours to tell.
     #[must_use]
     pub fn holds(&self) -> bool {
-        let allows = |row: &Row| row.false_alarms.low <= FALSE_ALARMS_PER_HOUR;
-        self.has_enough_hours() && self.rows.iter().all(allows)
+        let keeps = |row: &Row| row.false_alarms.per_hour <= FALSE_ALARMS_PER_HOUR;
+        self.has_enough_hours() && self.rows.iter().all(keeps)
     }
 
     /// Whether false alarms were counted long enough to be seen at the stated rate.

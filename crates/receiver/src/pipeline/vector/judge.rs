@@ -19,30 +19,32 @@ impl VectorTracking {
             .or_insert_with(|| Watch::new(self.monitors.clone(), clean))
     }
 
-    /// Shows every monitor its satellite's innovations, once time is exact: an error of the coarse time moves every
-    /// range by what its satellite comes nearer meanwhile, metres for tens of milliseconds, and none of them is
-    /// faulty.
+    /// Shows every monitor its satellite's innovations, `given` those of the others. Before time is exact only what the
+    /// shape of the correlation says is heard: an error of the coarse time moves every range by what its satellite comes
+    /// nearer meanwhile, metres for tens of milliseconds, and none of them is faulty.
     pub(super) fn show(
         &mut self,
         innovations: &Innovations,
+        given: &[GivenOthers],
         members: &mut [Member],
     ) -> Result<(), ReceiverError> {
-        let given = self.deviations(innovations)?;
         let heard = members.iter().filter(|m| m.epoch.lock != Lock::Lost);
         let heard = heard.map(|m| monitors::strength(m.satellite, &m.epoch));
         self.strengths.follow(&heard.collect::<Vec<_>>());
-        if self.time() == Time::Coarse {
-            return Ok(());
-        }
-        for (innovation, given) in innovations.satellites().iter().zip(&given) {
+        for (innovation, given) in innovations.satellites().iter().zip(given) {
+            let satellite = innovation.satellite;
             let mut members = members.iter_mut();
-            let Some(member) = members.find(|m| m.satellite == innovation.satellite) else {
+            let Some(member) = members.find(|m| m.satellite == satellite) else {
                 continue;
             };
-            let others_change = self.strengths.of_others(member.satellite.prn.into());
+            if self.time() == Time::Coarse {
+                self.watch(satellite).hear_shape(member.shape);
+                continue;
+            }
+            let others_change = self.strengths.of_others(satellite.prn.into());
             let step = monitors::step(innovation, given, &member.epoch, others_change);
             member.shown = Some(step);
-            self.watch(innovation.satellite).hear(&step, member.shape)?;
+            self.watch(satellite).hear(&step, member.shape)?;
         }
         Ok(())
     }
@@ -75,10 +77,9 @@ impl VectorTracking {
         epoch: &mut Epoch,
     ) -> Vec<(SatelliteId, Disposition)> {
         let policy = self.settings.policy;
-        let shown = epoch.members.iter().filter(|m| m.shown.is_some());
-        let alarms = shown.filter_map(|m| {
-            let excess = self.watches.get(&m.satellite)?.alarm()?;
-            Some((m.satellite, excess))
+        let alarms = innovations.satellites().iter().filter_map(|i| {
+            let excess = self.watches.get(&i.satellite)?.alarm()?;
+            Some((i.satellite, excess))
         });
         let one_at_a_time = self.settings.takes_back();
         let worst = alarms.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(s, _)| s);
@@ -117,8 +118,12 @@ impl VectorTracking {
         dispositions
     }
 
-    /// Suspends channels of which the gate keeps refusing measurements (Li2019), where they are watched.
+    /// Suspends channels of which the gate keeps refusing measurements (Li2019), where they are watched; not before time
+    /// is exact, when what it refuses may be no fault and nobody could clear them again.
     pub(super) fn isolate(&mut self, channels: &[SatelliteId], epoch: &mut Epoch) {
+        if self.time() == Time::Coarse {
+            return;
+        }
         let policy = self.settings.policy;
         for satellite in channels {
             let skipped = f64::from(self.faults.skipped_epochs(*satellite));

@@ -399,14 +399,15 @@ impl VectorTracking {
         if corrected && reach::leave_out(&mut now.measurements, &innovations, &now.reaches) {
             innovations = self.filter.innovations(&now.measurements)?;
         }
-        self.show(&innovations, &mut epoch.members)?;
+        let given = self.deviations(&innovations)?;
+        self.show(&innovations, &given, &mut epoch.members)?;
         let shown = epoch
             .members
             .iter()
             .filter_map(|m| Some((m.satellite, m.shown?)));
         now.shown = shown.collect();
         let gated = self.settings.gate != Gate::Off;
-        if gated && rate_gate::close(&mut now.measurements, &now.shown) {
+        if gated && rate_gate::close(&mut now.measurements, &given) {
             innovations = self.filter.innovations(&now.measurements)?;
         }
         now.told = self.believe(&innovations, epoch);

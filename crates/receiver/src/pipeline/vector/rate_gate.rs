@@ -5,25 +5,19 @@
 //! it would then seek a velocity that suits them all, and by it steer the other channels off their signals (a noisy
 //! oscillator did so once in 1700 runs of 400 s). Given the others a rate is expected to centimetres a second as well.
 
-use fault_ml::learned::ChannelStep;
-use gnss_nav::{Measurement, SatelliteId};
+use gnss_nav::Measurement;
+use gnss_nav::filter::GivenOthers;
 
 use super::monitors::CONTRADICTS_SIGMAS;
 
-/// Takes range rates out of `measurements` that contradict those of the others, and says whether there were any.
-pub(super) fn close(
-    measurements: &mut [Measurement],
-    shown: &[(SatelliteId, ChannelStep)],
-) -> bool {
+/// Takes range rates out of `measurements` that contradict those of the others, by what is `given` them, and says
+/// whether there were any.
+pub(super) fn close(measurements: &mut [Measurement], given: &[GivenOthers]) -> bool {
     let mut any = false;
     for measurement in measurements {
-        let is_of =
-            |(satellite, _): &&(SatelliteId, ChannelStep)| *satellite == measurement.satellite;
-        if shown
-            .iter()
-            .find(is_of)
-            .is_some_and(|(_, step)| contradicts(step))
-        {
+        let mut given = given.iter();
+        let given = given.find(|given| given.satellite == measurement.satellite);
+        if given.is_some_and(contradicts) {
             measurement.range_rate_variance_m2 = f64::INFINITY;
             any = true;
         }
@@ -31,17 +25,16 @@ pub(super) fn close(
     any
 }
 
-fn contradicts(step: &ChannelStep) -> bool {
-    let given = &step.given_others;
-    given.rate_mps.abs() > CONTRADICTS_SIGMAS * given.rate_sigma_mps
+fn contradicts(given: &GivenOthers) -> bool {
+    let most2 = CONTRADICTS_SIGMAS * CONTRADICTS_SIGMAS;
+    let rate = given.rate.as_ref();
+    rate.is_some_and(|rate| rate.normalised_squared() > most2)
 }
 
 #[cfg(test)]
 mod tests {
-    use fault_ml::Innovation;
-    use fault_ml::learned::StrengthChange;
-    use gnss_nav::SatelliteState;
-    use gnss_nav::{GpsTime, Measurement};
+    use gnss_nav::filter::Deviation;
+    use gnss_nav::{GpsTime, SatelliteId, SatelliteState};
     use nalgebra::Vector3;
 
     use super::*;
@@ -65,43 +58,30 @@ mod tests {
             user_range_accuracy_m: 2.0,
         };
         // By its own deviation the filter expects 0.69 m/s.
-        let step = |rate_mps, of_others_mps| {
-            let innovation = |rate_mps, rate_sigma_mps| Innovation {
-                code_m: 5.0,
-                code_sigma_m: 8.0,
-                rate_mps,
-                rate_sigma_mps,
-            };
-            ChannelStep {
-                satellite: 9,
-                innovation: innovation(rate_mps, 0.69),
-                given_others: innovation(of_others_mps, 0.025),
-                cn0_dbhz: 40.0,
-                cn0_now_hz: 1e4,
-                others_change: StrengthChange::default(),
-                tap_ratios: None,
-            }
+        let given = |prn, of_others_mps| GivenOthers {
+            satellite: SatelliteId::gps(prn),
+            code: Deviation {
+                value: 5.0,
+                variance: 64.0,
+            },
+            rate: Some(Deviation {
+                value: of_others_mps,
+                variance: 0.025 * 0.025,
+            }),
         };
-        let (slipped, sound) = (SatelliteId::gps(9), SatelliteId::gps(16));
         let mut measurements = [measurement(9), measurement(16), measurement(24)];
-        let quiet = [(slipped, step(0.54, 0.14)), (sound, step(-0.55, -0.03))];
+        let quiet = [given(9, 0.14), given(16, -0.03)];
         assert!(!close(&mut measurements, &quiet));
         assert_eq!(measurements[0], measurement(9));
-        let shown = [(slipped, step(0.54, 0.94)), (sound, step(-0.55, -0.03))];
-        assert!(close(&mut measurements, &shown));
+        let slipped = [given(9, 0.94), given(16, -0.03)];
+        assert!(close(&mut measurements, &slipped));
         assert_eq!(measurements[0].range_rate_variance_m2, f64::INFINITY);
         assert_eq!(measurements[1..], [measurement(16), measurement(24)]);
         // A rate that was not measured contradicts nothing.
-        let mut unheard = [measurement(9)];
-        let infinite = step(0.0, 0.0);
-        let given_others = Innovation {
-            rate_sigma_mps: f64::INFINITY,
-            ..infinite.given_others
+        let unheard = GivenOthers {
+            rate: None,
+            ..given(9, 0.94)
         };
-        let infinite = ChannelStep {
-            given_others,
-            ..infinite
-        };
-        assert!(!close(&mut unheard, &[(slipped, infinite)]));
+        assert!(!close(&mut [measurement(9)], &[unheard]));
     }
 }
