@@ -6,6 +6,7 @@ use std::process::ExitCode;
 
 use anyhow::Result;
 use clap::{Parser, Subcommand};
+use receiver::cli::on_one_line;
 use xtask::ci::ci;
 use xtask::code_noise::{self, Experiment, Parts};
 use xtask::demo::demo;
@@ -65,7 +66,7 @@ enum Task {
         #[arg(long, conflicts_with_all = ["cn0", "judged", "settle", "code_bandwidth"])]
         parts: bool,
     },
-    /// Experiments on the generator of signals that take minutes: tables with a verdict
+    /// Experiments on receiver, monitors and generator that take minutes: tables with a verdict
     #[command(subcommand)]
     Validate(Validation),
     /// Repeat the experiments of a paper: summary.json, report.md and pictures.
@@ -73,10 +74,10 @@ enum Task {
         /// Which paper.
         #[arg(value_enum)]
         paper: Paper,
-        /// How the signals of jiang2017 and li2019 are made [default: if, and correlator]
+        /// How the signals of jiang2017, li2019 and zhu2020 are made [default: if, correlator, correlator]
         #[arg(long, value_enum)]
         level: Option<Level>,
-        /// Seeds of each scenario of jiang2017 and li2019 [default: 8 and 12]
+        /// Seeds of each scenario of jiang2017, li2019 and zhu2020 [default: 8, 12, 16]
         #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
         seeds: Option<u16>,
         /// Folder that receives a folder of the paper's name, and of all papers an index.
@@ -195,14 +196,22 @@ enum Validation {
 }
 
 fn main() -> ExitCode {
-    match perform(Arguments::parse().task) {
+    let arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        // Help and version.
+        Err(error) if error.exit_code() == 0 => error.exit(),
+        Err(error) => return wrong(&format!("{} (see --help)", on_one_line(&error))),
+    };
+    match perform(arguments.task) {
         Ok(code) => code,
-        Err(error) => {
-            // Nothing is left to do where standard error is closed too.
-            let _ = writeln!(io::stderr(), "error: {error:#}");
-            ExitCode::from(2)
-        }
+        Err(error) => wrong(&format!("{error:#}")),
     }
+}
+
+fn wrong(what: &str) -> ExitCode {
+    // Nothing is left to do where standard error is closed too.
+    let _ = writeln!(io::stderr(), "error: {what}");
+    ExitCode::from(2)
 }
 
 fn positive(text: &str) -> Result<f64, String> {

@@ -88,7 +88,7 @@ pub(crate) fn measure(
                 pseudorange_m: RawMeasurement::pseudorange_m(receive_time, expected.transmit_time),
                 range_rate_mps: expected.range_rate_mps,
                 pseudorange_variance_m2: 5.8 * 5.8,
-                range_rate_variance_m2: 0.06 * 0.06,
+                range_rate_variance_m2_s2: 0.06 * 0.06,
                 cn0_dbhz: 45.0,
             })
         })

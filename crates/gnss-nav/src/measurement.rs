@@ -23,7 +23,7 @@ pub struct RawMeasurement {
     /// Variance of the pseudorange by tracking noise, m^2.
     pub pseudorange_variance_m2: f64,
     /// Variance of the range rate, (m/s)^2; infinite where no Doppler was measured.
-    pub range_rate_variance_m2: f64,
+    pub range_rate_variance_m2_s2: f64,
     /// Carrier-to-noise density, dB-Hz.
     pub cn0_dbhz: f64,
 }
@@ -50,7 +50,7 @@ pub struct Measurement {
     /// Variance of the pseudorange by tracking noise, m^2.
     pub pseudorange_variance_m2: f64,
     /// Variance of the range rate, (m/s)^2; infinite where no Doppler was measured.
-    pub range_rate_variance_m2: f64,
+    pub range_rate_variance_m2_s2: f64,
     /// Carrier-to-noise density, dB-Hz.
     pub cn0_dbhz: f64,
     /// The satellite at transmission, in the frame of transmission.
@@ -114,7 +114,7 @@ fn join(
         pseudorange_m: raw.pseudorange_m,
         range_rate_mps: raw.range_rate_mps,
         pseudorange_variance_m2: variance,
-        range_rate_variance_m2: raw.range_rate_variance_m2,
+        range_rate_variance_m2_s2: raw.range_rate_variance_m2_s2,
         cn0_dbhz: raw.cn0_dbhz,
         state,
         user_range_accuracy_m: ephemeris.user_range_accuracy_m(),

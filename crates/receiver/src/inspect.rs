@@ -1,5 +1,11 @@
 //! What a file holds, as text with bars.
 
+mod model;
+mod scenario;
+
+pub use model::model_text;
+pub use scenario::scenario_text;
+
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
 use std::fs::File;
@@ -17,12 +23,16 @@ use crate::samples;
 use crate::summary::Summary;
 
 /// What kind of file it is.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum Kind {
     /// Results of a run; the path is that of `summary.json`.
     Result(PathBuf),
     /// RINEX navigation data, as far as its first line tells.
     Navigation,
+    /// Weights or card of a trained monitor.
+    Model,
+    /// A scenario of the generator of signals.
+    Scenario(toml::Table),
     /// Anything else.
     Recording,
 }
@@ -62,9 +72,22 @@ pub fn kind(path: &Path) -> Result<Kind, ReceiverError> {
         Ok(Kind::Result(path.to_owned()))
     } else if rinex || gzip {
         Ok(Kind::Navigation)
+    } else if is_model(path, &start) {
+        Ok(Kind::Model)
+    } else if let Some(scenario) = scenario::read(path) {
+        Ok(Kind::Scenario(scenario))
     } else {
         Ok(Kind::Recording)
     }
+}
+
+fn is_model(path: &Path, start: &[u8]) -> bool {
+    let format = fault_ml::learned::FORMAT.as_bytes();
+    let is_card = start.first() == Some(&b'{') && start.windows(format.len()).any(|w| w == format);
+    is_card
+        || path
+            .extension()
+            .is_some_and(|extension| extension == "safetensors")
 }
 
 /// The result of a run.

@@ -1,12 +1,14 @@
 //! One run of the receiver over any source of correlator sums, with its files.
 
+use std::path::PathBuf;
+
 use fault_ml::learned::ModelKind;
 use fault_ml::shape::ShapeSettings;
 use gnss_nav::GpsTime;
 use gnss_signal::{CorrelatorBank, SignalId};
 
 use crate::ReceiverError;
-use crate::config::{Ionosphere, Mode, MonitorChoice, RunConfig, Troposphere};
+use crate::config::{Input, Ionosphere, Mode, MonitorChoice, RunConfig, Troposphere};
 use crate::cost::Meter;
 use crate::models::default_model;
 use crate::pipeline::{self, Aiding, Outcome, Settings, ShapeWatching, VectorSettings};
@@ -65,6 +67,7 @@ impl Session {
             position_file: false,
             // Not the name of the input: a file and standard input give the same bytes.
             title: "GPS receiver run".to_owned(),
+            inputs: inputs(&config),
         })?;
         let received = pipeline::run(bank, &settings, &mut |record| outputs.record(&record));
         let outcome = received.map_err(|error| match error {
@@ -122,6 +125,16 @@ fn settings(config: &RunConfig, nav: Option<NavigationFile>) -> Result<Settings,
             .transpose()?,
         ..Settings::default()
     })
+}
+
+/// Files that are read.
+fn inputs(config: &RunConfig) -> Vec<PathBuf> {
+    let samples = match &config.recording.input {
+        Input::File(path) => Some(path),
+        Input::Stdin => None,
+    };
+    let files = [samples, config.nav.as_ref(), config.truth.as_ref()];
+    files.into_iter().flatten().cloned().collect()
 }
 
 /// Monitors whose scores are written.

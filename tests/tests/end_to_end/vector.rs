@@ -368,3 +368,22 @@ fn what_an_excluded_satellite_said_is_taken_back() {
     let (taken_back, kept) = (after_m(10.0), after_m(0.0));
     assert!(taken_back < 0.5 * kept, "{taken_back} and {kept} m");
 }
+
+#[test]
+fn a_clock_that_has_run_off_tells_no_wrong_millisecond() {
+    // Half a millisecond after 200 s; a satellite that was away is placed by prediction until its message is read again.
+    let overrides = [
+        "duration_s=250.0",
+        "clock={preset=\"tcxo\",drift=2.5e-6}",
+        "fault=[{kind=\"blocked\",sat=\"G17\",begin_s=220,end_s=235}]",
+        "receiver={assisted=true}",
+    ];
+    let scenario = scenario("static-open-sky", &overrides, Some(1));
+    let judged = receive(&scenario, Level::Correlator, &settings(&scenario)).unwrap();
+    let excluded = happened(&judged, 235.0, |k| matches!(k, EventKind::Excluded { .. }));
+    assert_eq!(excluded, None);
+    let back =
+        |c: &&ChannelRecord| c.satellite.prn == 17 && c.time_s > 235.0 && c.pseudorange_m.is_some();
+    let back_s = judged.channels.iter().find(back).unwrap().time_s;
+    assert!(back_s < 240.5, "{back_s} s");
+}

@@ -90,7 +90,7 @@ pub fn train(trained: Trained, training: &Dataset, runs: u32) -> Result<LearnedM
     Ok(model.with_card(card)?)
 }
 
-/// Labelled steps as `cargo xtask train data` has written them.
+/// Labelled steps as `cargo xtask train --save-data` has written them.
 ///
 /// # Errors
 /// Names file, line and column of what is wrong.

@@ -52,7 +52,7 @@ impl Problem {
             let rate = State::from([0.0, x, 0.0, y, 0.0, z, 0.0, 1.0]);
             problem.rows.extend([code, rate]);
             problem.residuals.extend([1.0, 0.05]);
-            let variances = [m.pseudorange_variance_m2, m.range_rate_variance_m2];
+            let variances = [m.pseudorange_variance_m2, m.range_rate_variance_m2_s2];
             problem.variances.extend(variances);
         }
         problem

@@ -72,7 +72,7 @@ fn measure(k: usize, state: SatelliteState, receiver: &NavState) -> Measurement 
         pseudorange_m: predicted.pseudorange_m + receiver.clock_bias_m + 1.0,
         range_rate_mps: rate + receiver.clock_drift_mps,
         pseudorange_variance_m2: 33.0,
-        range_rate_variance_m2: 0.0036,
+        range_rate_variance_m2_s2: 0.0036,
         cn0_dbhz: 45.0,
         state,
         user_range_accuracy_m: 2.0,

@@ -118,6 +118,29 @@ impl Ephemeris {
         Ok((time, self.state_at(time)?))
     }
 
+    /// Refuses what no GPS satellite flies. A message could hold it, and undetected bit errors or a damaged file make
+    /// it; the bounds are wider than any orbit that was ever kept (nominal: 5153.6 m^0.5, e < 0.03, 55 degrees).
+    ///
+    /// # Errors
+    /// [`NavError::Value`] that names the element.
+    pub fn check_orbit(&self) -> Result<(), NavError> {
+        let bounds = [
+            ("sqrt_a", self.sqrt_a, 5000.0..5300.0, "5000 to 5300 m^0.5"),
+            ("eccentricity", self.eccentricity, 0.0..0.1, "0 to 0.1"),
+            ("i0_rad", self.i0_rad, 0.7..1.3, "0.7 to 1.3 rad"),
+        ];
+        for (name, value, bound, expected) in bounds {
+            if !bound.contains(&value) {
+                return Err(NavError::Value {
+                    name,
+                    value: value.to_string(),
+                    expected,
+                });
+            }
+        }
+        Ok(())
+    }
+
     /// Length of the curve fit interval around `toe`, h (IS-GPS-200 20.3.3.4.3.1, table 20-XII).
     #[must_use]
     pub const fn fit_interval_h(&self) -> f64 {

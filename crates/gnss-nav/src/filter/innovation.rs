@@ -132,7 +132,7 @@ fn innovation(
         code_row(measurement, predicted, expected, model),
         measurement,
     )?;
-    let rate = if measurement.range_rate_variance_m2.is_infinite() {
+    let rate = if measurement.range_rate_variance_m2_s2.is_infinite() {
         None
     } else {
         Some(checked(
@@ -190,7 +190,7 @@ fn rate_row(measurement: &Measurement, state: &NavState, expected: &Predicted) -
         observable: Observable::RangeRate,
         gradient: Vector4::new(g.x, g.y, g.z, 1.0),
         residual: measurement.range_rate_mps - predicted_mps,
-        variance: measurement.range_rate_variance_m2 + expected.delay_rate_variance_m2_s2,
+        variance: measurement.range_rate_variance_m2_s2 + expected.delay_rate_variance_m2_s2,
     }
 }
 

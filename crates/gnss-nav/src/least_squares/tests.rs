@@ -49,7 +49,7 @@ fn measure(k: usize, state: SatelliteState) -> Measurement {
         pseudorange_m: predicted.pseudorange_m + CLOCK_M,
         range_rate_mps: range_rate + DRIFT_MPS - SPEED_OF_LIGHT_MPS * state.clock_drift,
         pseudorange_variance_m2: 4.0,
-        range_rate_variance_m2: 0.01,
+        range_rate_variance_m2_s2: 0.01,
         cn0_dbhz: 45.0,
         state,
         user_range_accuracy_m: 2.0,
@@ -98,7 +98,7 @@ fn mask_and_missing_dopplers() {
     };
     let mut m = measurements(8);
     for one in &mut m[..5] {
-        one.range_rate_variance_m2 = f64::INFINITY;
+        one.range_rate_variance_m2_s2 = f64::INFINITY;
     }
     let solution = solve(&m, &masked, &Vector3::zeros()).unwrap();
     assert_eq!(solution.masked, [SatelliteId::gps(1)]);

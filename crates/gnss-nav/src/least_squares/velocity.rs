@@ -26,7 +26,7 @@ impl RateEquation {
             &predicted.delay_rate,
             measurement.state.clock_drift,
             measurement.range_rate_mps,
-            measurement.range_rate_variance_m2 + predicted.delay_rate_variance_m2_s2,
+            measurement.range_rate_variance_m2_s2 + predicted.delay_rate_variance_m2_s2,
         )
     }
 

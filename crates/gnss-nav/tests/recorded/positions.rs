@@ -84,7 +84,7 @@ pub(crate) fn raw(row: &[&str]) -> RawMeasurement {
         pseudorange_m,
         range_rate_mps: 0.0,
         pseudorange_variance_m2: 0.3f64.powi(2),
-        range_rate_variance_m2: f64::INFINITY,
+        range_rate_variance_m2_s2: f64::INFINITY,
         cn0_dbhz: number(row, 12),
     }
 }

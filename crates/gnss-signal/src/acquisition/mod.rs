@@ -218,13 +218,21 @@ fn search_all(
     std::thread::scope(|scope| {
         let workers: Vec<_> = codes
             .chunks(run)
-            .map(|codes| scope.spawn(move || search_run(codes)))
+            .map(|codes| {
+                let builder = std::thread::Builder::new();
+                (
+                    codes,
+                    builder.spawn_scoped(scope, move || search_run(codes)),
+                )
+            })
             .collect();
         workers
             .into_iter()
-            .flat_map(|worker| match worker.join() {
-                Ok(searches) => searches,
-                Err(cause) => std::panic::resume_unwind(cause),
+            .flat_map(|(codes, worker)| match worker.map(|worker| worker.join()) {
+                Ok(Ok(searches)) => searches,
+                Ok(Err(cause)) => std::panic::resume_unwind(cause),
+                // The system has no thread left.
+                Err(_) => search_run(codes),
             })
             .collect()
     })

@@ -96,10 +96,11 @@ pub enum PhaseDiscriminator {
 }
 
 impl PhaseDiscriminator {
-    /// Phase error, cycles. Exact within its range.
+    /// Phase error, cycles. Exact within its range. Zero for a zero sum.
     #[must_use]
     pub fn error_cycles(self, prompt: Complex64) -> f64 {
         match self {
+            _ if prompt.re == 0.0 && prompt.im == 0.0 => 0.0,
             Self::Costas if prompt.re == 0.0 => prompt.im.signum() * FRAC_PI_2 / TAU,
             Self::Costas => (prompt.im / prompt.re).atan() / TAU,
             Self::FourQuadrant => prompt.im.atan2(prompt.re) / TAU,
@@ -131,7 +132,7 @@ impl FrequencyDiscriminator {
                 ratio(cross * sign, second.norm_sqr()) / (TAU * dt_s)
             }
             Self::Atan => PhaseDiscriminator::Costas.error_cycles(product) / dt_s,
-            Self::FourQuadrant => cross.atan2(dot) / (TAU * dt_s),
+            Self::FourQuadrant => PhaseDiscriminator::FourQuadrant.error_cycles(product) / dt_s,
         }
     }
 }
@@ -267,7 +268,19 @@ mod tests {
         ] {
             assert_eq!(kind.error_chips(&zero, 0.5), 0.0);
         }
-        let frequency = FrequencyDiscriminator::CrossSignDot;
-        assert_eq!(frequency.error_hz(zero.prompt, zero.prompt, 0.01), 0.0);
+        for frequency in [
+            FrequencyDiscriminator::CrossSignDot,
+            FrequencyDiscriminator::Atan,
+            FrequencyDiscriminator::FourQuadrant,
+        ] {
+            assert_eq!(frequency.error_hz(zero.prompt, -zero.prompt, 0.01), 0.0);
+            assert_eq!(
+                frequency.error_hz(Complex64::new(-3.0, 1.0), zero.prompt, 0.01),
+                0.0
+            );
+        }
+        for phase in [PhaseDiscriminator::Costas, PhaseDiscriminator::FourQuadrant] {
+            assert_eq!(phase.error_cycles(-zero.prompt), 0.0);
+        }
     }
 }

@@ -163,6 +163,9 @@ impl Steady {
         if self.is_steered() {
             self.helm = Helm::Own(CodeLoop::new(variance_chips2));
             self.nco.code_slip_hz = 0.0;
+            // What the own loops saw last may be minutes old.
+            self.previous_prompt = None;
+            self.slope = PhaseSlope::default();
         }
     }
 

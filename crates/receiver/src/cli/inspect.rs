@@ -17,6 +17,8 @@ pub(super) fn inspect(
     let text = match inspect::kind(file)? {
         inspect::Kind::Result(summary) => inspect::result_text(&summary)?,
         inspect::Kind::Navigation => inspect::navigation_text(&rinex_nav::read(file)?),
+        inspect::Kind::Model => inspect::model_text(file)?,
+        inspect::Kind::Scenario(scenario) => inspect::scenario_text(&scenario),
         inspect::Kind::Recording => {
             let sidecar = sigmf::read(file)?;
             let format = format.map(str::parse).transpose()?.or(sidecar.format);

@@ -117,24 +117,30 @@ fn with_files(directory: Option<&Path>, summary: &Summary) -> String {
     format!("{files}{summary}")
 }
 
-/// The first paragraph of what clap says, on one line.
+/// What is wrong with the options.
 fn usage(error: &clap::Error) -> ReceiverError {
+    let said = on_one_line(error);
+    let what = if said.is_empty() || said.starts_with("GPS software") {
+        "no command: expected run, acquire, solve or inspect"
+    } else {
+        &said
+    };
+    ReceiverError::Option {
+        what: format!("{what} (see --help)"),
+    }
+}
+
+/// The first paragraph of what clap says, on one line.
+#[must_use]
+pub fn on_one_line(error: &clap::Error) -> String {
     let text = error.render().to_string();
     let paragraph: Vec<&str> = text
         .lines()
         .map(str::trim)
         .take_while(|line| !line.is_empty())
         .collect();
-    let what = paragraph.join(" ");
-    let what = what.strip_prefix("error: ").unwrap_or(&what);
-    let what = if what.is_empty() || what.starts_with("GPS software") {
-        "no command: expected run, acquire, solve or inspect"
-    } else {
-        what
-    };
-    ReceiverError::Option {
-        what: format!("{what} (see --help)"),
-    }
+    let said = paragraph.join(" ");
+    said.strip_prefix("error: ").unwrap_or(&said).to_owned()
 }
 
 #[cfg(test)]

@@ -279,7 +279,7 @@ impl Checks<'_> {
             SignalId::gps_l1_ca(prn).ok().map(|_| prn)
         };
         let range = |item: &str| match item.split_once('-') {
-            Some((first, last)) => Some(one(first)?..=one(last)?),
+            Some((first, last)) => Some(one(first)?..=one(last)?).filter(|range| !range.is_empty()),
             None => one(item).map(|prn| prn..=prn),
         };
         let ranges: Option<Vec<_>> = text.split(',').map(range).collect();

@@ -51,6 +51,13 @@ impl Belief {
         self.suspended.is_some()
     }
 
+    /// The signal is gone: to be believed again it has to be healthy anew.
+    pub(super) fn lost(&mut self) {
+        if let Some(suspended) = &mut self.suspended {
+            suspended.clean_epochs = 0;
+        }
+    }
+
     /// One monitor is enough to suspend; to be believed again all that judge must find it healthy.
     pub(super) fn follow(&mut self, judgements: &[Said]) -> Option<Change> {
         if judgements.is_empty() {
@@ -139,6 +146,16 @@ mod tests {
 
     fn said(score: f64) -> [Said; 1] {
         [("ewma", Judgement::new(score, 1.0).unwrap())]
+    }
+
+    #[test]
+    fn healthy_epochs_before_a_loss_do_not_count() {
+        let mut belief = Belief::new(2);
+        belief.follow(&said(1.5));
+        assert_eq!(belief.follow(&said(0.5)), None);
+        belief.lost();
+        assert_eq!(belief.follow(&said(0.5)), None);
+        assert_eq!(belief.follow(&said(0.5)), Some(Change::Cleared));
     }
 
     #[test]

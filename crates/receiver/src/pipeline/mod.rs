@@ -10,6 +10,8 @@ mod clock;
 mod discontinuity;
 mod fixes;
 mod follow;
+mod measured;
+mod navigated;
 mod navigator;
 mod outcome;
 mod report;

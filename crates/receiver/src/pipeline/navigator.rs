@@ -2,10 +2,9 @@
 
 use gnss_nav::atmosphere::Klobuchar;
 use gnss_nav::coarse_time::{self, Prior, SnapshotMeasurement, SnapshotSolution};
-use gnss_nav::constants::{L1_HZ, L1_WAVELENGTH_M, SPEED_OF_LIGHT_MPS};
-use gnss_nav::filter::Disposition;
-use gnss_nav::integrity::{Assured, Misfit, ProtectionLevels};
-use gnss_nav::least_squares::{Consistency, Solution};
+use gnss_nav::constants::{L1_WAVELENGTH_M, SPEED_OF_LIGHT_MPS};
+use gnss_nav::integrity::Assured;
+use gnss_nav::least_squares::Solution;
 use gnss_nav::measurement::{ErrorModel, Formed, MeasurementModel, RawMeasurement, form};
 use gnss_nav::prediction::{Expected, ReceiverState, predict};
 use gnss_nav::{Ephemeris, EphemerisStore, GpsTime, NavState, SatelliteId};
@@ -13,6 +12,8 @@ use gnss_signal::tracking::{ChannelEpoch, Lock};
 use nalgebra::Vector3;
 
 use super::clock::{ClockTrust, ReceiverClock};
+use super::measured::{NEEDED, code_variance_m2, raw_measurement, shape_dispositions, weighted};
+use super::navigated::Navigated;
 use super::settings::Settings;
 use super::slot::{Slot, transmit_fraction_s};
 use crate::ReceiverError;
@@ -45,46 +46,6 @@ pub(super) struct Tracked<'a> {
     pub(super) epoch: ChannelEpoch,
 }
 
-/// What an epoch brought.
-#[derive(Debug, Clone)]
-pub(super) struct Navigated {
-    /// The solution, where there is one.
-    pub(super) fix: Option<(Solution, Source)>,
-    /// Satellites that do not fit it.
-    pub(super) misfits: Vec<Misfit>,
-    /// How far off it may be, where that can be said.
-    pub(super) protection: Option<ProtectionLevels>,
-    /// Receiver clock at the epoch, where it is good enough for pseudoranges.
-    pub(super) receive_time: Option<GpsTime>,
-    /// The measurements, where the clock is good enough.
-    pub(super) raw: Vec<RawMeasurement>,
-    /// What the solution did with each by the shape of its correlation.
-    pub(super) dispositions: Vec<Disposition>,
-}
-
-impl Navigated {
-    /// Neither a solution nor measurements.
-    pub(super) const fn nothing() -> Self {
-        Self {
-            fix: None,
-            misfits: Vec::new(),
-            protection: None,
-            receive_time: None,
-            raw: Vec::new(),
-            dispositions: Vec::new(),
-        }
-    }
-
-    /// The solution, where it is one of least squares whose measurements agree.
-    pub(super) fn consistent(&self) -> Option<&Solution> {
-        let (solution, source) = self.fix.as_ref()?;
-        let consistent = *source == Source::LeastSquares
-            && solution.consistency == Consistency::Passed
-            && solution.velocity.is_some();
-        consistent.then_some(solution)
-    }
-}
-
 /// Knows ephemerides, time and place, and finds the next.
 #[derive(Debug)]
 pub(super) struct Navigator {
@@ -107,7 +68,10 @@ pub(super) struct Navigator {
 struct Place {
     position_ecef_m: Vector3<f64>,
     velocity_ecef_mps: Vector3<f64>,
+    /// What the receiver's clock was ahead by at `tick`, m.
+    clock_bias_m: f64,
     clock_drift_mps: f64,
+    tick: u64,
     solved: bool,
 }
 
@@ -122,7 +86,9 @@ impl Navigator {
         let place = aiding.position_ecef_m.map(|position_ecef_m| Place {
             position_ecef_m,
             velocity_ecef_mps: Vector3::zeros(),
+            clock_bias_m: 0.0,
             clock_drift_mps: 0.0,
+            tick: 0,
             solved: false,
         });
         Ok(Self {
@@ -186,12 +152,14 @@ impl Navigator {
         near.is_some_and(|time| self.store.select(satellite, time).is_some())
     }
 
-    /// Takes over where vector tracking has got to.
-    pub(super) fn follow(&mut self, state: &NavState) {
+    /// Takes over where vector tracking has got to at `tick`.
+    pub(super) fn follow(&mut self, tick: u64, state: &NavState) {
         self.place = Some(Place {
             position_ecef_m: state.position_ecef_m,
             velocity_ecef_mps: state.velocity_ecef_mps,
+            clock_bias_m: state.clock_bias_m,
             clock_drift_mps: state.clock_drift_mps,
+            tick,
             solved: true,
         });
         self.near = Some(state.time);
@@ -214,7 +182,9 @@ impl Navigator {
     /// What is expected of a satellite, where time, place and ephemeris are known.
     fn expected(&self, satellite: SatelliteId, tick: u64) -> Option<Expected> {
         let place = self.place?;
-        let time = self.clock?.at(tick);
+        let since_s = (tick as f64 - place.tick as f64) / self.sample_rate_hz;
+        let ahead_m = place.clock_bias_m + place.clock_drift_mps * since_s;
+        let time = self.clock?.at(tick) - ahead_m / SPEED_OF_LIGHT_MPS;
         let ephemeris = self.store.select(satellite, time)?;
         let receiver = ReceiverState {
             time,
@@ -349,9 +319,13 @@ impl Navigator {
 
     fn settle(&mut self, tick: u64, solution: &Solution) {
         let velocity = solution.velocity.as_ref();
+        let coarse = self.clock.is_some_and(|c| c.trust == ClockTrust::Coarse);
         self.place = Some(Place {
             position_ecef_m: solution.position_ecef_m,
             velocity_ecef_mps: velocity.map_or_else(Vector3::zeros, |v| v.velocity_ecef_mps),
+            // A coarse clock is set anew below.
+            clock_bias_m: if coarse { 0.0 } else { solution.clock_bias_m },
+            tick,
             clock_drift_mps: velocity.map_or(0.0, |v| v.clock_drift_mps),
             solved: true,
         });
@@ -475,65 +449,4 @@ fn largest_agreement(offsets_s: &[f64]) -> Vec<f64> {
     };
     let all = offsets_s.iter().map(agreeing);
     all.max_by_key(Vec::len).unwrap_or_default()
-}
-
-fn code_variance_m2(epoch: &ChannelEpoch) -> f64 {
-    let chip_m = SPEED_OF_LIGHT_MPS / epoch.signal.spec().code_rate_hz;
-    epoch.code_variance_chips2 * chip_m * chip_m
-}
-
-fn raw_measurement(
-    epoch: &ChannelEpoch,
-    satellite: SatelliteId,
-    receive_time: GpsTime,
-    transmit_time: GpsTime,
-) -> RawMeasurement {
-    let wavelength_m = L1_WAVELENGTH_M;
-    debug_assert!((L1_HZ - epoch.signal.spec().carrier_hz).abs() < 1.0);
-    RawMeasurement {
-        satellite,
-        transmit_time,
-        pseudorange_m: RawMeasurement::pseudorange_m(receive_time, transmit_time),
-        range_rate_mps: -wavelength_m * epoch.doppler_hz,
-        pseudorange_variance_m2: code_variance_m2(epoch),
-        range_rate_variance_m2: wavelength_m * wavelength_m * epoch.doppler_variance_hz2,
-        cn0_dbhz: epoch.cn0_dbhz,
-    }
-}
-
-/// Fewer satellites make no solution.
-const NEEDED: usize = 4;
-
-/// Measurements and what is to be done with them by the shapes of their satellites' correlations: weighted,
-/// not left out, where too few would be left.
-fn shape_dispositions(raw: &[RawMeasurement], tracked: &[Tracked]) -> Vec<Disposition> {
-    let shape = |r: &RawMeasurement| {
-        let mut of = tracked.iter().filter(|t| t.slot.satellite == r.satellite);
-        of.find_map(|t| t.slot.shape.as_ref())
-    };
-    let told = |r: &RawMeasurement| shape(r).map_or(Disposition::Use, |s| s.disposition(r));
-    let all: Vec<_> = raw.iter().map(told).collect();
-    let left = all.iter().filter(|d| **d != Disposition::Exclude).count();
-    if left == all.len() || left >= NEEDED {
-        return all;
-    }
-    let weighted = |r: &RawMeasurement| shape(r).map_or(Disposition::Use, |s| s.weighted(r));
-    raw.iter().map(weighted).collect()
-}
-
-/// A measurement with its weight, unless it is left out.
-fn weighted(raw: &RawMeasurement, disposition: Disposition) -> Option<RawMeasurement> {
-    match disposition {
-        Disposition::Use => Some(*raw),
-        Disposition::Deweight { variance_factor } => Some(RawMeasurement {
-            pseudorange_variance_m2: raw.pseudorange_variance_m2 * variance_factor,
-            ..*raw
-        }),
-        Disposition::Exclude => None,
-    }
-}
-
-/// Whether the measurements of a solution contradict each other.
-pub(super) fn is_contradictory(solution: &Solution) -> bool {
-    matches!(solution.consistency, Consistency::Failed)
 }

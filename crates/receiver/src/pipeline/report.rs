@@ -9,7 +9,8 @@ use gnss_signal::tracking::{ChannelEpoch, Lock};
 use nalgebra::Matrix3;
 
 use super::belief::Said;
-use super::navigator::{Navigated, Tracked, is_contradictory};
+use super::navigated::{Navigated, is_contradictory};
+use super::navigator::Tracked;
 use super::shape::{self, ShapeWatch};
 use super::slot::Slot;
 use crate::record::{
@@ -235,7 +236,7 @@ fn residuals(satellite: SatelliteId, navigated: &Navigated) -> Residuals {
     let rate = used.and_then(|u| {
         Some(InnovationRecord {
             value: u.range_rate_residual_mps?,
-            sigma: raw?.range_rate_variance_m2.sqrt(),
+            sigma: raw?.range_rate_variance_m2_s2.sqrt(),
         })
     });
     (code, rate)

@@ -10,6 +10,8 @@ const FIRST_SEARCH_MS: u32 = 60;
 const LATER_SEARCH_MS: u32 = 60;
 /// ... this often, s: satellites rise and buildings end slowly.
 const LATER_PERIOD_S: f64 = 30.0;
+/// ... or this often where nothing at all is tracked, s: a recording may begin before its antenna does.
+const IDLE_PERIOD_S: f64 = 1.0;
 /// A signal lost is looked for this often, s, ...
 const LOST_PERIOD_S: f64 = 0.5;
 /// ... for this long, s, ...
@@ -23,6 +25,7 @@ pub(super) struct Schedule {
     sample_rate_hz: f64,
     searched: bool,
     next_later_s: f64,
+    next_idle_s: f64,
     next_lost_s: f64,
     lost: BTreeMap<SignalId, Lost>,
 }
@@ -50,6 +53,7 @@ impl Schedule {
             sample_rate_hz,
             searched: false,
             next_later_s: LATER_PERIOD_S,
+            next_idle_s: IDLE_PERIOD_S,
             next_lost_s: 0.0,
             lost: BTreeMap::new(),
         }
@@ -69,12 +73,12 @@ impl Schedule {
         self.lost.remove(&hit.signal);
     }
 
-    /// The searches due at `now` (a tick), given whether the samples end here and which signals
-    /// are wanted.
+    /// The searches due at `now` (a tick), given whether the samples end here, whether nothing is
+    /// tracked, and which signals are wanted.
     pub(super) fn due(
         &mut self,
         now: u64,
-        ended: bool,
+        (ended, idle): (bool, bool),
         wanted: &[SignalId],
         range: &DopplerRange,
     ) -> Vec<SearchRequest> {
@@ -84,8 +88,9 @@ impl Schedule {
         }
         let span = (f64::from(LATER_SEARCH_MS + 2) * 1e-3 * self.sample_rate_hz) as u64;
         let start = now.saturating_sub(span);
-        if now_s >= self.next_later_s {
+        if now_s >= self.next_later_s || (idle && now_s >= self.next_idle_s) {
             self.next_later_s = now_s + LATER_PERIOD_S;
+            self.next_idle_s = now_s + IDLE_PERIOD_S;
             return vec![self.request(wanted.to_vec(), start, LATER_SEARCH_MS, range)];
         }
         if now_s < self.next_lost_s {
@@ -131,5 +136,28 @@ impl Schedule {
             noncoherent_sums,
             false_alarm_probability: range.false_alarm_probability,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn where_nothing_is_tracked_it_searches_every_second() {
+        let range = DopplerRange {
+            centre_hz: 0.0,
+            half_width_hz: 6e3,
+            false_alarm_probability: 1e-3,
+        };
+        let signals = [SignalId::gps_l1_ca(7).unwrap()];
+        // Ten seconds, a look a tenth of a second.
+        let searches = |idle: bool| {
+            let mut schedule = Schedule::new(1e6);
+            let ticks = (1..=100).map(|k| k * 100_000);
+            let due = ticks.map(|tick| schedule.due(tick, (false, idle), &signals, &range).len());
+            due.sum::<usize>()
+        };
+        assert_eq!((searches(true), searches(false)), (11, 1));
     }
 }

@@ -40,7 +40,8 @@ impl<B: CorrelatorBank> Run<'_, B> {
             return Ok(());
         }
         let range = self.doppler_range();
-        for request in self.schedule.due(now, ended, &wanted, &range) {
+        let idle = self.slots.is_empty();
+        for request in self.schedule.due(now, (ended, idle), &wanted, &range) {
             for hit in self.bank.search(&request)?.hits {
                 self.open(now, &hit)?;
             }

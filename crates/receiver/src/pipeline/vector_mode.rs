@@ -4,7 +4,8 @@ use gnss_nav::least_squares::{Consistency, Solution};
 use gnss_signal::CorrelatorBank;
 
 use super::fixes::tracked;
-use super::navigator::{Navigated, Navigator, Tracked};
+use super::navigated::Navigated;
+use super::navigator::{Navigator, Tracked};
 use super::report;
 use super::run::{Fixed, Run};
 use super::vector::{self, Outlook, Surroundings, Time, VectorTracking};
@@ -111,6 +112,7 @@ impl<B: CorrelatorBank> Run<'_, B> {
             return Ok(());
         }
         let Some(around) = surroundings(&self.navigator, now, tracking.time()) else {
+            self.vector = Some(tracking);
             return self.leave_vector_tracking(now);
         };
         let model = self.navigator.model();
@@ -119,7 +121,7 @@ impl<B: CorrelatorBank> Run<'_, B> {
             self.vector = Some(tracking);
             return self.leave_vector_tracking(now);
         };
-        self.navigator.follow(tracking.state());
+        self.navigator.follow(now, tracking.state());
         self.look_over_sky(now, &tracking)?;
         for (satellite, kind) in epoch.events.clone() {
             self.emit(now, satellite, kind)?;

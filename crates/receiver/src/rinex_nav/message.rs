@@ -131,7 +131,7 @@ fn ephemeris(
         orbit[at].ok_or_else(|| format!("the ephemeris of {satellite} lacks its {name}"))
     };
     let optional = |at: usize| orbit[at].unwrap_or(0.0);
-    Ok(Ephemeris {
+    let ephemeris = Ephemeris {
         satellite,
         af0_s,
         af1,
@@ -157,12 +157,25 @@ fn ephemeris(
         codes_on_l2: optional(17) as u8,
         l2_p_data_off: optional(19) != 0.0,
         ura_index: ura_index(value(20, "accuracy")?),
-        health: (value(21, "health")? as u16 & 0x3f) as u8,
+        health: health(value(21, "health")?),
         tgd_s: value(22, "TGD")?,
         iodc: value(23, "IODC")? as u16 & 0x3ff,
         fit_interval_extended: is_fit_extended(optional(25)),
         toc,
-    })
+    };
+    let flies = ephemeris.check_orbit();
+    flies.map_err(|error| format!("the ephemeris of {satellite}: {error}"))?;
+    Ok(ephemeris)
+}
+
+/// The six bits of health; what six bits cannot be is not healthy.
+fn health(field: f64) -> u8 {
+    let whole = field as u8;
+    if f64::from(whole) == field && whole < 64 {
+        whole
+    } else {
+        63
+    }
 }
 
 /// `toe` from its time of week, in the week that brings it nearest to `toc`: the week printed

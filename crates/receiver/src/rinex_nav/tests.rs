@@ -263,6 +263,10 @@ fn what_is_wrong_is_named_with_its_line() {
             "G02 lacks its eccentricity",
         ),
         (
+            good.replacen("2.000000000000E-2", "1.200000000000E+0", 1),
+            "the ephemeris of G02: eccentricity",
+        ),
+        (
             cut(8) + "\nG03",
             "line 9: the ephemeris of G02 is cut short",
         ),

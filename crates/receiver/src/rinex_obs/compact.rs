@@ -39,13 +39,17 @@ struct Arc {
 pub(super) type Field = Option<(i64, u8)>;
 
 impl Compact {
-    /// The line of an epoch from what the file has in its place.
+    /// The line of an epoch from what the file has in its place. After one in full all satellites begin anew.
     pub(super) fn epoch_line(&mut self, line: &[u8]) -> Result<&[u8], String> {
         match line.first() {
-            Some(b'>') => self.epoch_line = line.to_vec(),
+            Some(b'>') => {
+                self.epoch_line = line.to_vec();
+                self.satellites.clear();
+            }
             Some(b'&') => {
                 self.epoch_line = line.to_vec();
                 self.epoch_line[0] = b' ';
+                self.satellites.clear();
             }
             _ if self.epoch_line.is_empty() => {
                 return Err("the first epoch is not written in full".to_owned());

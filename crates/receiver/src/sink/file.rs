@@ -76,9 +76,14 @@ impl OutputFile {
     /// # Errors
     /// [`ReceiverError::File`]; nothing is left behind then.
     pub fn commit(&mut self) -> Result<(), ReceiverError> {
-        self.with_writer(Write::flush)?;
+        self.with_writer(|writer| {
+            writer.flush()?;
+            // Some file systems find out only now that they are full.
+            writer.get_ref().sync_data()
+        })?;
+        fs::rename(&self.temporary, &self.path).map_err(|source| self.error(source))?;
         self.writer = None;
-        fs::rename(&self.temporary, &self.path).map_err(|source| self.error(source))
+        Ok(())
     }
 
     fn with_writer<T>(

@@ -81,7 +81,11 @@ impl EventSink for TrackNmea {
                 };
             }
             Record::IonosphereUtc(parameters) => self.leap_seconds = Some(parameters.leap_seconds),
-            Record::Pvt(pvt) => return self.solution(pvt),
+            Record::Pvt(pvt) => {
+                self.solution(pvt)?;
+                // Those of the next epoch tell of themselves.
+                self.used.clear();
+            }
             _ => {}
         }
         Ok(())

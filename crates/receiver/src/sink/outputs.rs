@@ -5,17 +5,17 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use super::EventSink;
-use super::channels::ChannelsCsv;
-use super::events::EventsJsonl;
+use super::channels::{self, ChannelsCsv};
+use super::events::{self, EventsJsonl};
 use super::file::{OutputFile, create_directory};
-use super::kml::TrackKml;
-use super::navigation::NavigationRinex;
-use super::nmea::TrackNmea;
-use super::observations::ObservationsRinex;
-use super::position::PositionFile;
+use super::kml::{self, TrackKml};
+use super::navigation::{self, NavigationRinex};
+use super::nmea::{self, TrackNmea};
+use super::observations::{self, ObservationsRinex};
+use super::position::{self, PositionFile};
 use super::pvt::{self, PvtCsv};
-use super::report::Report;
-use super::taps::TapsCsv;
+use super::report::{self, Report};
+use super::taps::{self, TapsCsv};
 use crate::ReceiverError;
 use crate::cost::Cost;
 use crate::record::Record;
@@ -35,6 +35,8 @@ pub struct OutputSettings {
     pub position_file: bool,
     /// Title of the report.
     pub title: String,
+    /// Files that the run reads: none of them may be one that it writes.
+    pub inputs: Vec<PathBuf>,
 }
 
 /// How a run ended.
@@ -73,6 +75,7 @@ impl Outputs {
             return Ok(outputs);
         };
         create_directory(directory)?;
+        spare(&settings.inputs, directory)?;
         for late in [SUMMARY_NAME, COST_NAME] {
             OutputFile::create(directory, late)?;
         }
@@ -150,6 +153,43 @@ impl Outputs {
 const SUMMARY_NAME: &str = "summary.json";
 const COST_NAME: &str = "cost.json";
 
+/// Every file that a run may write.
+const NAMES: [&str; 12] = [
+    SUMMARY_NAME,
+    COST_NAME,
+    pvt::FILE_NAME,
+    channels::FILE_NAME,
+    events::FILE_NAME,
+    observations::FILE_NAME,
+    navigation::FILE_NAME,
+    kml::FILE_NAME,
+    nmea::FILE_NAME,
+    position::FILE_NAME,
+    taps::FILE_NAME,
+    report::FILE_NAME,
+];
+
+/// Refuses to write over what is read.
+fn spare(inputs: &[PathBuf], directory: &Path) -> Result<(), ReceiverError> {
+    let written: Vec<PathBuf> = NAMES
+        .iter()
+        .filter_map(|name| directory.join(name).canonicalize().ok())
+        .collect();
+    let lost = |input: &&PathBuf| {
+        input
+            .canonicalize()
+            .is_ok_and(|path| written.contains(&path))
+    };
+    inputs.iter().find(lost).map_or(Ok(()), |input| {
+        Err(ReceiverError::Option {
+            what: format!(
+                "{}: is read and would be written: expected another --out",
+                input.display()
+            ),
+        })
+    })
+}
+
 /// Writes `cost.json` into `directory`.
 ///
 /// # Errors
@@ -212,6 +252,22 @@ mod tests {
                 (name, std::fs::read(entry.path()).unwrap())
             })
             .collect()
+    }
+
+    #[test]
+    fn what_is_read_is_not_written_over() {
+        let folder = tempfile::tempdir().unwrap();
+        let input = folder.path().join("navigation.rnx");
+        std::fs::write(&input, "of a station").unwrap();
+        let settings = OutputSettings {
+            directory: Some(folder.path().to_owned()),
+            inputs: vec![folder.path().join(".").join("navigation.rnx")],
+            ..OutputSettings::default()
+        };
+        let refused = Outputs::open(&settings).err().unwrap().to_string();
+        assert!(refused.contains("navigation.rnx: is read"), "{refused}");
+        assert_eq!(std::fs::read_to_string(&input).unwrap(), "of a station");
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
     }
 
     #[test]

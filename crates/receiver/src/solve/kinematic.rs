@@ -283,8 +283,8 @@ impl Kinematic {
                 let beyond_m2 = (code - 1.0) * i.code.noise_variance();
                 Measurement {
                     pseudorange_variance_m2: code_share * (m.pseudorange_variance_m2 + beyond_m2),
-                    range_rate_variance_m2: rate_share
-                        * m.range_rate_variance_m2
+                    range_rate_variance_m2_s2: rate_share
+                        * m.range_rate_variance_m2_s2
                         * learnt.rate.max(rate_now),
                     ..*m
                 }

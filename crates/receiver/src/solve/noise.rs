@@ -81,7 +81,7 @@ impl Weights {
             pseudorange_m,
             range_rate_mps: -observed.doppler_hz.unwrap_or(0.0) * L1_WAVELENGTH_M,
             pseudorange_variance_m2: variance(LEAST_CODE_M, CODE_M),
-            range_rate_variance_m2: match observed.doppler_hz {
+            range_rate_variance_m2_s2: match observed.doppler_hz {
                 Some(_) => variance(LEAST_RATE_MPS, RATE_MPS),
                 None => f64::INFINITY,
             },

@@ -119,7 +119,7 @@ pub(super) fn channel(
             None => used.and_then(|u| {
                 Some(InnovationRecord {
                     value: u.range_rate_residual_mps?,
-                    sigma: raw.range_rate_variance_m2.sqrt(),
+                    sigma: raw.range_rate_variance_m2_s2.sqrt(),
                 })
             }),
         },

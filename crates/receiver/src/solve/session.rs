@@ -72,6 +72,7 @@ impl SolveSession {
                 .collect(),
             position_file: true,
             title: "GPS positions from observations".to_owned(),
+            inputs: inputs(&config),
             ..OutputSettings::default()
         })?;
         for epoch in reader {
@@ -86,6 +87,12 @@ impl SolveSession {
         }
         Ok(summary)
     }
+}
+
+/// Files that are read.
+fn inputs(config: &SolveConfig) -> Vec<PathBuf> {
+    let all = [&config.obs].into_iter().chain(&config.nav);
+    all.chain(&config.truth).cloned().collect()
 }
 
 /// All ephemerides, and the ionosphere of the first file that has one.

@@ -80,7 +80,7 @@ fn introduction(study: &Study) -> String {
          is gone reports nothing.\n\
          - *Exclusion*: the innovation test once per update, 30 updates, 0.01 false alarms a channel and hour: of code and range rate, 100 Hz, on \
          the paper's, of the code, 50 Hz, on the product's.\n\
-         - *SVM of 30*, *LSTM of 50*: trained on raw innovations of a blocked channel (64 runs of other seeds at 30, 35, 40 and 45 dB-Hz), in place of the \
+         - *SVM of 30*, *LSTM of 50*: trained on raw innovations of a blocked channel (runs of other seeds at 40 and 45 dB-Hz, some blockages of which end), in place of the \
          innovation test. *Its SVM*, *its LSTM*: those that come with the receiver.\n\n\
          One setting differs from the receiver's defaults in all four, because of the scenario's clock: until the filter takes over the carrier loops \
          have {CARRIER_HZ} Hz instead of 10 Hz, with which they slip on its white frequency noise. That noise is common to all range rates; before \

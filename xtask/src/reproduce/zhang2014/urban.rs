@@ -223,7 +223,7 @@ fn epoch(
                 pseudorange_m: satellite.range_m + CHIP_M * seen.late_chips + NOISE_M * noise,
                 range_rate_mps: 0.0,
                 pseudorange_variance_m2: SIGMA_M * SIGMA_M,
-                range_rate_variance_m2: f64::INFINITY,
+                range_rate_variance_m2_s2: f64::INFINITY,
                 cn0_dbhz: CN0_DBHZ,
                 state: satellite.state,
                 user_range_accuracy_m: 0.0,

@@ -188,7 +188,7 @@ impl Loops for Vector {
                 pseudorange_m: measured.range_m,
                 range_rate_mps: measured.rate_mps,
                 pseudorange_variance_m2: measured.range_m2,
-                range_rate_variance_m2: measured.rate_m2_s2,
+                range_rate_variance_m2_s2: measured.rate_m2_s2,
                 cn0_dbhz: 0.0,
                 state: *state,
                 user_range_accuracy_m: 0.0,

@@ -31,7 +31,7 @@ impl SvmPredictor {
         bias: f32,
         gamma: f32,
     ) -> Result<Self, MonitorError> {
-        let numbers = (dimensions * weights.len()) as f64;
+        let numbers = dimensions as f64 * weights.len() as f64;
         within("dimensions", dimensions as f64, (1.0, 1e6), "1 to 1e6")?;
         within(
             "support vectors",

@@ -14,7 +14,7 @@ fn measurements() -> Vec<Measurement> {
     let mut all = measure(&store, &receiver(), &ungated().model);
     for m in &mut all {
         m.pseudorange_m += m.pseudorange_variance_m2.sqrt() * normal(&mut rng);
-        m.range_rate_mps += m.range_rate_variance_m2.sqrt() * normal(&mut rng);
+        m.range_rate_mps += m.range_rate_variance_m2_s2.sqrt() * normal(&mut rng);
     }
     all
 }

@@ -33,7 +33,7 @@ fn values_that_are_not_finite() {
         |m| m.pseudorange_m = f64::NAN,
         |m| m.range_rate_mps = f64::INFINITY,
         |m| m.pseudorange_variance_m2 = f64::INFINITY,
-        |m| m.range_rate_variance_m2 = f64::NAN,
+        |m| m.range_rate_variance_m2_s2 = f64::NAN,
         |m| m.pseudorange_variance_m2 = 0.0,
         |m| m.state.position_ecef_m.x = f64::NAN,
     ];

@@ -26,7 +26,7 @@ fn noisy(seed: u64) -> Vec<Measurement> {
     let mut measurements = exact();
     for m in &mut measurements {
         m.pseudorange_m += m.pseudorange_variance_m2.sqrt() * normal(&mut rng);
-        m.range_rate_mps += m.range_rate_variance_m2.sqrt() * normal(&mut rng);
+        m.range_rate_mps += m.range_rate_variance_m2_s2.sqrt() * normal(&mut rng);
     }
     measurements
 }
@@ -63,7 +63,7 @@ fn both(satellite: SatelliteId, reason: SkipReason) -> [Skipped; 2] {
 fn exact_measurements_bring_a_wrong_filter_to_the_truth() {
     let mut measurements = exact();
     for m in &mut measurements {
-        (m.pseudorange_variance_m2, m.range_rate_variance_m2) = (1e-6, 1e-8);
+        (m.pseudorange_variance_m2, m.range_rate_variance_m2_s2) = (1e-6, 1e-8);
     }
     let (filter, update) = updated(
         wrong::<super::super::Sequential>(ungated()),
@@ -146,7 +146,7 @@ fn dispositions_are_obeyed() {
     assert_eq!(update.skipped, []);
     let mut weaker = measurements.clone();
     weaker[1].pseudorange_variance_m2 *= 9.0;
-    weaker[1].range_rate_variance_m2 *= 9.0;
+    weaker[1].range_rate_variance_m2_s2 *= 9.0;
     let (same, _) = updated(filter, &weaker, &[]);
     assert_eq!(deweighted.state(), same.state());
     assert_eq!(deweighted.covariance(), same.covariance());
@@ -155,7 +155,7 @@ fn dispositions_are_obeyed() {
 #[test]
 fn what_is_not_measured_is_not_used() {
     let mut measurements = exact();
-    measurements[2].range_rate_variance_m2 = f64::INFINITY;
+    measurements[2].range_rate_variance_m2_s2 = f64::INFINITY;
     measurements[2].range_rate_mps = f64::NAN;
     let mut settings = ungated();
     settings.model.elevation_mask_rad = 30f64.to_radians();

@@ -125,7 +125,7 @@ pub(in crate::lnav) fn check_near(ephemeris: &Ephemeris, time: GpsTime) -> Resul
 /// # Errors
 /// [`NavError::Value`] names a number that its field cannot hold or that is no GPS orbit's.
 pub(in crate::lnav) fn write(ephemeris: &Ephemeris) -> Result<[DataWords; 3], NavError> {
-    check_orbit(ephemeris)?;
+    ephemeris.check_orbit()?;
     let mut subframes = [DataWords::FILLER; 3];
     let [one, two, three] = &mut subframes;
     write_clock(ephemeris, one)?;
@@ -200,30 +200,8 @@ pub(in crate::lnav) fn read(
     ORBIT_3
         .iter()
         .for_each(|term| term.read(three, &mut ephemeris));
-    check_orbit(&ephemeris)?;
+    ephemeris.check_orbit()?;
     Ok(ephemeris)
-}
-
-/// Refuses what no GPS satellite flies. The message could hold it, and undetected bit errors make
-/// it; the bounds are wider than any orbit that was ever kept (nominal: 5153.6 m^0.5, e < 0.03,
-/// 55 degrees).
-fn check_orbit(ephemeris: &Ephemeris) -> Result<(), NavError> {
-    let bounds = [
-        (
-            "sqrt_a",
-            ephemeris.sqrt_a,
-            5000.0..5300.0,
-            "5000 to 5300 m^0.5",
-        ),
-        ("eccentricity", ephemeris.eccentricity, 0.0..0.1, "0 to 0.1"),
-        ("i0_rad", ephemeris.i0_rad, 0.7..1.3, "0.7 to 1.3 rad"),
-    ];
-    for (name, value, bound, expected) in bounds {
-        if !bound.contains(&value) {
-            return Err(value_error(name, value, expected));
-        }
-    }
-    Ok(())
 }
 
 fn whole(name: &'static str, value: impl Into<u32>, bits: u32) -> Result<u32, NavError> {

@@ -21,6 +21,8 @@ use crate::{Replica, TapOffsets};
 const LEAST_PERIODS: usize = 60;
 /// Periods between two looks at the stretch.
 const LOOK_PERIODS: usize = 20;
+/// Periods that tracking goes back when navigation lets go, at most: two seconds of samples are kept.
+const OLDEST_PERIODS: i64 = 1500;
 /// Periods before the power of a stretch is judged.
 const JUDGE_PERIODS: usize = 400;
 
@@ -96,13 +98,21 @@ impl PullIn {
             return None;
         };
         let start = self.steered_start(&found);
-        let nco = self.at_first_bit(start, edge);
+        let nco = self.at_first_bit(start, self.recent(edge));
         Some(Steady::new(
             nco,
             settings,
             found.cn0_hz,
             code_variance_chips2,
         ))
+    }
+
+    /// The boundary of bits at `edge` periods from the start, or a later one that is not too old.
+    fn recent(&self, edge: u32) -> u32 {
+        let since = self.nco.nearest_period() - self.start.nearest_period();
+        let oldest = u32::try_from(since - OLDEST_PERIODS).unwrap_or(0);
+        let bit = self.start.signal.spec().code_periods_per_bit;
+        edge + oldest.saturating_sub(edge).div_ceil(bit) * bit
     }
 
     /// The next period.

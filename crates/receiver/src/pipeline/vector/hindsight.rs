@@ -42,6 +42,7 @@ pub(super) struct Taken {
     pub(super) drift_variance_m2_s2: f64,
     /// Acceleration that range rates were carried to the epoch by, ECEF, m/s^2.
     acceleration_mps2: Vector3<f64>,
+    /// As they were taken, whatever of them was not heard.
     pub(super) measurements: Vec<Measurement>,
     /// How old range rates were.
     pub(super) ages_s: Vec<(SatelliteId, f64)>,
@@ -60,10 +61,11 @@ impl Taken {
         shown.find(|(s, _)| *s == satellite).map(|(_, step)| *step)
     }
 
-    fn disposition(&self, satellite: SatelliteId) -> Disposition {
+    /// What the filter was told of `satellite`.
+    fn disposition(&self, satellite: SatelliteId) -> Option<Disposition> {
         let mut told = self.told.iter();
         let told = told.find(|(s, _)| *s == satellite);
-        told.map_or(Disposition::Use, |(_, disposition)| *disposition)
+        told.map(|(_, disposition)| *disposition)
     }
 
     /// Carries range rates to the epoch by another acceleration, of a receiver at `receiver_m`, ECEF.
@@ -114,15 +116,23 @@ impl Hindsight {
         self.moved = true;
     }
 
-    /// What the filter is `told` of at this epoch, of satellites that it used at the last.
+    /// What the filter is `told` of at this epoch, of satellites that it used when it last was told of them.
     fn newly_faulty(&self, told: &[(SatelliteId, Disposition)]) -> Vec<(SatelliteId, Disposition)> {
-        let Some(last) = self.epochs.back() else {
-            return Vec::new();
+        let last = |satellite| {
+            let mut epochs = self.epochs.iter().rev();
+            epochs.find_map(|epoch| epoch.disposition(satellite))
         };
         let is_new = |(satellite, disposition): &&(SatelliteId, Disposition)| {
-            *disposition != Disposition::Use && last.disposition(*satellite) == Disposition::Use
+            *disposition != Disposition::Use && last(*satellite) == Some(Disposition::Use)
         };
         told.iter().filter(is_new).copied().collect()
+    }
+
+    /// The signal of `satellite` is gone: what monitors were shown of it no longer counts.
+    pub(super) fn forget(&mut self, satellite: SatelliteId) {
+        for epoch in &mut self.epochs {
+            epoch.shown.retain(|(s, _)| *s != satellite);
+        }
     }
 }
 
@@ -196,10 +206,11 @@ impl VectorTracking {
         }
         let innovations = self.predict_again(now)?;
         self.scatter = scatter;
-        for (satellite, _) in &now.shown {
+        self.faults.clear();
+        for (satellite, watch) in &mut self.watches {
             let seen = epochs.iter().chain([&*now]);
             let steps: Vec<ChannelStep> = seen.filter_map(|t| t.step(*satellite)).collect();
-            self.watch(*satellite).hear_again(&steps)?;
+            watch.hear_again(&steps)?;
         }
         self.hindsight.epochs = epochs;
         self.hindsight.corrected = Some(now.receive_time);
@@ -214,9 +225,9 @@ impl VectorTracking {
         taken.accelerate(self.acceleration_mps2, &self.state().position_ecef_m);
         let mut innovations = self.filter.innovations(&taken.measurements)?;
         // A copy: it may be taken in yet again, without another satellite.
-        let mut measurements = taken.measurements.clone();
-        if reach::leave_out(&mut measurements, &innovations, &taken.reaches) {
-            innovations = self.filter.innovations(&measurements)?;
+        let mut heard = taken.measurements.clone();
+        if reach::leave_out(&mut heard, &innovations, &taken.reaches) {
+            innovations = self.filter.innovations(&heard)?;
         }
         let given = self.deviations(&innovations)?;
         for (innovation, given) in innovations.satellites().iter().zip(&given) {
@@ -224,6 +235,9 @@ impl VectorTracking {
             if let Some((_, step)) = shown.find(|(s, _)| *s == innovation.satellite) {
                 *step = monitors::step_again(step, innovation, given);
             }
+        }
+        if self.closes_rates(&mut heard, &given) {
+            innovations = self.filter.innovations(&heard)?;
         }
         Ok(innovations)
     }

@@ -19,9 +19,9 @@ impl VectorTracking {
             .or_insert_with(|| Watch::new(self.monitors.clone(), clean))
     }
 
-    /// Shows every monitor its satellite's innovations, `given` those of the others. Before time is exact only what the
-    /// shape of the correlation says is heard: an error of the coarse time moves every range by what its satellite comes
-    /// nearer meanwhile, metres for tens of milliseconds, and none of them is faulty.
+    /// Shows every monitor its satellite's innovations, `given` those of the others, once time is exact: an error of the
+    /// coarse time moves every range by what its satellite comes nearer meanwhile, metres for tens of milliseconds, and
+    /// none of them is faulty.
     pub(super) fn show(
         &mut self,
         innovations: &Innovations,
@@ -31,16 +31,15 @@ impl VectorTracking {
         let heard = members.iter().filter(|m| m.epoch.lock != Lock::Lost);
         let heard = heard.map(|m| monitors::strength(m.satellite, &m.epoch));
         self.strengths.follow(&heard.collect::<Vec<_>>());
+        if self.time() == Time::Coarse {
+            return Ok(());
+        }
         for (innovation, given) in innovations.satellites().iter().zip(given) {
             let satellite = innovation.satellite;
             let mut members = members.iter_mut();
             let Some(member) = members.find(|m| m.satellite == satellite) else {
                 continue;
             };
-            if self.time() == Time::Coarse {
-                self.watch(satellite).hear_shape(member.shape);
-                continue;
-            }
             let others_change = self.strengths.of_others(satellite.prn.into());
             let step = monitors::step(innovation, given, &member.epoch, others_change);
             member.shown = Some(step);

@@ -25,13 +25,14 @@ use std::collections::BTreeMap;
 use fault_ml::learned::{ChannelStep, CommonStrength};
 use gnss_nav::coarse_time::SnapshotSolution;
 use gnss_nav::filter::{
-    Advice, Disposition, EpochGeometry, FaultLogic, FaultThresholds, Gate, Innovations, NavFilter,
-    Observable, SatelliteInnovation, SkipReason, Update,
+    Advice, Disposition, EpochGeometry, FaultLogic, FaultThresholds, Gate, GivenOthers,
+    Innovations, NavFilter, Observable, SatelliteInnovation, SkipReason, Update,
 };
 use gnss_nav::measurement::form;
 use gnss_nav::prediction::Expected;
 use gnss_nav::{
-    EphemerisStore, GpsTime, MeasurementModel, NavState, RawMeasurement, SatelliteId, Solution,
+    EphemerisStore, GpsTime, Measurement, MeasurementModel, NavState, RawMeasurement, SatelliteId,
+    Solution,
 };
 use gnss_signal::tracking::{ChannelEpoch, Lock};
 use nalgebra::{Vector3, Vector4};
@@ -319,6 +320,7 @@ impl VectorTracking {
         }
         if epoch.lock == Lock::Lost {
             self.watch(satellite).lost();
+            self.hindsight.forget(satellite);
         }
         let raw = steering::raw_measurement(
             &epoch,
@@ -362,7 +364,7 @@ impl VectorTracking {
             MeasurementNoise::Fixed { .. } => 0.0,
         };
         RawMeasurement {
-            range_rate_variance_m2: raw.range_rate_variance_m2 + excess,
+            range_rate_variance_m2_s2: raw.range_rate_variance_m2_s2 + excess,
             ..raw
         }
     }
@@ -384,7 +386,7 @@ impl VectorTracking {
         let measurements = &now.measurements;
         if measurements
             .iter()
-            .any(|m| m.range_rate_variance_m2.is_finite())
+            .any(|m| m.range_rate_variance_m2_s2.is_finite())
         {
             let white = self.settings.process_noise.clock.white_m2_per_s;
             now.drift_variance_m2_s2 = white / self.settings.interval_s;
@@ -395,9 +397,10 @@ impl VectorTracking {
             self.step_clock(&step, epoch)?;
             innovations = self.filter.innovations(measurements)?;
         }
+        let mut heard = measurements.clone();
         let corrected = self.was_corrected(now.receive_time);
-        if corrected && reach::leave_out(&mut now.measurements, &innovations, &now.reaches) {
-            innovations = self.filter.innovations(&now.measurements)?;
+        if corrected && reach::leave_out(&mut heard, &innovations, &now.reaches) {
+            innovations = self.filter.innovations(&heard)?;
         }
         let given = self.deviations(&innovations)?;
         self.show(&innovations, &given, &mut epoch.members)?;
@@ -406,9 +409,8 @@ impl VectorTracking {
             .iter()
             .filter_map(|m| Some((m.satellite, m.shown?)));
         now.shown = shown.collect();
-        let gated = self.settings.gate != Gate::Off;
-        if gated && rate_gate::close(&mut now.measurements, &given) {
-            innovations = self.filter.innovations(&now.measurements)?;
+        if self.closes_rates(&mut heard, &given) {
+            innovations = self.filter.innovations(&heard)?;
         }
         now.told = self.believe(&innovations, epoch);
         if let Some(again) = self.take_back(&mut now)? {
@@ -417,12 +419,12 @@ impl VectorTracking {
                 member.shown = now.step(member.satellite);
             }
         }
-        let (measurements, dispositions) = (&now.measurements, &now.told);
+        let dispositions = &now.told;
         let update = self.filter.update(&innovations, dispositions)?;
         self.note(&innovations, dispositions, &update, epoch);
         match self.faults.observe(&innovations, &update) {
             Advice::Reset(channels) => {
-                self.reset(measurements, channels.len(), epoch)?;
+                self.reset(&heard, channels.len(), epoch)?;
             }
             Advice::Isolate(channels) => self.isolate(&channels, epoch),
             Advice::Nothing => {}
@@ -436,6 +438,11 @@ impl VectorTracking {
             self.outlook = Outlook::Lost;
         }
         Ok(())
+    }
+
+    /// Takes range rates out of `heard` that contradict those of the others, where there is a gate.
+    fn closes_rates(&self, heard: &mut [Measurement], given: &[GivenOthers]) -> bool {
+        self.settings.gate != Gate::Off && rate_gate::close(heard, given)
     }
 
     /// Remembers what an update used.

@@ -18,7 +18,7 @@ pub(super) fn close(measurements: &mut [Measurement], given: &[GivenOthers]) -> 
         let mut given = given.iter();
         let given = given.find(|given| given.satellite == measurement.satellite);
         if given.is_some_and(contradicts) {
-            measurement.range_rate_variance_m2 = f64::INFINITY;
+            measurement.range_rate_variance_m2_s2 = f64::INFINITY;
             any = true;
         }
     }
@@ -47,7 +47,7 @@ mod tests {
             pseudorange_m: 2.2e7,
             range_rate_mps: 100.0,
             pseudorange_variance_m2: 60.0,
-            range_rate_variance_m2: 1e-4,
+            range_rate_variance_m2_s2: 1e-4,
             cn0_dbhz: 40.0,
             state: SatelliteState {
                 position_ecef_m: Vector3::zeros(),
@@ -75,7 +75,7 @@ mod tests {
         assert_eq!(measurements[0], measurement(9));
         let slipped = [given(9, 0.94), given(16, -0.03)];
         assert!(close(&mut measurements, &slipped));
-        assert_eq!(measurements[0].range_rate_variance_m2, f64::INFINITY);
+        assert_eq!(measurements[0].range_rate_variance_m2_s2, f64::INFINITY);
         assert_eq!(measurements[1..], [measurement(16), measurement(24)]);
         // A rate that was not measured contradicts nothing.
         let unheard = GivenOthers {

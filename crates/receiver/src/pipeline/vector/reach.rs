@@ -33,7 +33,7 @@ pub(super) fn leave_out(
         let expected_hz = (rate.value() - measurement.range_rate_mps) / L1_WAVELENGTH_M;
         let sigma_hz = (rate.variance() - rate.noise_variance()).sqrt() / L1_WAVELENGTH_M;
         if sigma_hz <= CERTAIN * reach.width_hz && !reach.holds(expected_hz) {
-            measurement.range_rate_variance_m2 = f64::INFINITY;
+            measurement.range_rate_variance_m2_s2 = f64::INFINITY;
             any = true;
         }
     }
@@ -69,7 +69,7 @@ mod tests {
             pseudorange_m: 2.0e7,
             range_rate_mps,
             pseudorange_variance_m2: 60.0,
-            range_rate_variance_m2: 0.04,
+            range_rate_variance_m2_s2: 0.04,
             cn0_dbhz: 45.0,
             state: SatelliteState {
                 position_ecef_m: Vector3::new(2.6378e7, 0.0, 0.0),
@@ -100,7 +100,7 @@ mod tests {
         let unsure = knowing(1.0).innovations(&measurements).unwrap();
         assert!(!leave_out(&mut measurements, &unsure, &far));
         assert!(leave_out(&mut measurements, &innovations, &far));
-        let heard = measurements.map(|m| m.range_rate_variance_m2.is_finite());
+        let heard = measurements.map(|m| m.range_rate_variance_m2_s2.is_finite());
         assert_eq!(heard, [true, false, false]);
     }
 }

@@ -7,8 +7,9 @@ use gnss_nav::{Measurement, MeasurementModel, Solution};
 
 use super::clock_step::ClockStep;
 use super::filter::{filter, from_solution};
-use super::{Epoch, Outlook, VectorTracking};
+use super::{Epoch, Outlook, VectorTracking, report};
 use crate::ReceiverError;
+use crate::pipeline::belief::Change;
 use crate::record::EventKind;
 
 /// Satellites a fix to start anew from may leave out: most channels may contradict the filter.
@@ -77,7 +78,12 @@ impl VectorTracking {
         let kind = EventKind::FilterReset { channels };
         epoch.events.push((None, kind));
         self.filter = from_solution(&solution, measurements, &self.model, &self.settings)?;
-        self.watches.clear();
+        for (satellite, watch) in std::mem::take(&mut self.watches) {
+            if watch.is_suspended() {
+                let kind = report::change(&Change::Cleared, self.settings.policy);
+                epoch.events.push((Some(satellite), kind));
+            }
+        }
         self.velocities.clear();
         self.hindsight.clear();
         Ok(())

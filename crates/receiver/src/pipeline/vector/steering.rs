@@ -84,7 +84,7 @@ pub(super) fn raw_measurement(
         pseudorange_m: RawMeasurement::pseudorange_m(receive_time, transmit_time),
         range_rate_mps: -L1_WAVELENGTH_M * epoch.doppler_hz,
         pseudorange_variance_m2: code,
-        range_rate_variance_m2: if has_rate { rate } else { f64::INFINITY },
+        range_rate_variance_m2_s2: if has_rate { rate } else { f64::INFINITY },
         cn0_dbhz: epoch.cn0_dbhz,
     })
 }

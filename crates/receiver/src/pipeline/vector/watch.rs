@@ -39,6 +39,7 @@ impl Watch {
         self.monitors.iter_mut().for_each(Monitor::reset);
         self.judgements.clear();
         self.shape = None;
+        self.belief.lost();
     }
 
     /// Shows this epoch to every monitor, and takes what the `shape` of the correlation says, which is
@@ -57,21 +58,11 @@ impl Watch {
                 self.judgements.push((monitor.name(), judgement));
             }
         }
-        self.take_shape(shape);
-        Ok(())
-    }
-
-    /// Takes what the `shape` of the correlation says, and nothing else of this epoch.
-    pub(super) fn hear_shape(&mut self, shape: Option<ShapeSaid>) {
-        self.judgements.clear();
-        self.take_shape(shape);
-    }
-
-    fn take_shape(&mut self, shape: Option<ShapeSaid>) {
         self.shape = shape;
         self.judgements
             .extend(shape.map(|s| (shape::NAME, s.judgement)));
         self.is_watched |= shape.is_some();
+        Ok(())
     }
 
     /// Shows the last epochs to every monitor as if they were the first: the filter, and so the innovations, were
