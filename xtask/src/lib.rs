@@ -1,5 +1,6 @@
 //! Project tasks: made-up signals, experiments on them, and the checks of the tree.
 
+pub mod campaign;
 pub mod ci;
 pub mod code_noise;
 pub mod demo;

@@ -7,6 +7,7 @@ use std::process::ExitCode;
 use anyhow::Result;
 use clap::{Parser, Subcommand};
 use receiver::cli::on_one_line;
+use xtask::campaign::campaign;
 use xtask::ci::ci;
 use xtask::code_noise::{self, Experiment, Parts};
 use xtask::demo::demo;
@@ -82,6 +83,15 @@ enum Task {
         seeds: Option<u16>,
         /// Folder that receives a folder of the paper's name, and of all papers an index.
         #[arg(long, value_name = "DIR", default_value = "reproduced")]
+        out: PathBuf,
+    },
+    /// Many seeded runs of scenarios, one row each; taken up again where it was left
+    Campaign {
+        /// Cases, seeds and options (docs/scenarios.md)
+        #[arg(value_name = "FILE.toml")]
+        file: PathBuf,
+        /// Folder of the rows
+        #[arg(long, value_name = "DIR")]
         out: PathBuf,
     },
     /// Train a monitor on made-up runs, write model and card
@@ -338,6 +348,10 @@ fn perform(task: Task) -> Result<ExitCode> {
             let told = |outcome: &Outcome| Ok(writeln!(out, "{outcome}")?);
             let outcomes = reproduce(paper, Making { level, seeds }, &folder, told)?;
             Ok(verdict(outcomes.iter().all(Outcome::holds)))
+        }
+        Task::Campaign { file, out: folder } => {
+            write!(out, "{}", campaign(&file, &folder)?)?;
+            Ok(ExitCode::SUCCESS)
         }
         Task::Train {
             monitor,

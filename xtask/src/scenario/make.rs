@@ -25,7 +25,8 @@ const ROUGH_HEIGHT_M: f64 = 1000.0;
 const ROUGH_TIME_S: f64 = 10.0;
 
 /// At which level a signal is made.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Level {
     /// Intermediate-frequency samples
     If,
