@@ -387,3 +387,35 @@ fn a_clock_that_has_run_off_tells_no_wrong_millisecond() {
     let back_s = judged.channels.iter().find(back).unwrap().time_s;
     assert!(back_s < 240.5, "{back_s} s");
 }
+
+#[test]
+fn a_first_velocity_that_is_worse_than_stated_leads_nobody_astray() {
+    // Drawn at random; its first velocity errs by 13 m/s and is stated to 4.
+    let series = Series {
+        seed: 19,
+        week: 2587,
+    };
+    let judged = run(&Plan::healthy(1357, series, 10.0).scenario().unwrap());
+    for epoch in judged.between(2.0, 10.0) {
+        let (error_m, time_s) = (epoch.position_enu_m.norm(), epoch.pvt.time_s);
+        assert!(error_m < 5.0, "{error_m} m at {time_s}");
+    }
+}
+
+#[test]
+fn four_satellites_one_of_them_gone_make_no_position() {
+    // Drawn at random, in scalar tracking throughout: what the loop finds in noise is no pseudorange.
+    let series = Series {
+        seed: 20,
+        week: 2595,
+    };
+    let scenario = Plan::new(190, series).scenario().unwrap();
+    let judged = run(&scenario);
+    let told = judged
+        .between(10.0, 32.0)
+        .filter(|e| e.pvt.status != Status::Unreliable);
+    assert!(told.clone().count() > 50);
+    for epoch in told {
+        assert!(epoch.horizontal_m() < 10.0, "{:?}", epoch.pvt);
+    }
+}

@@ -8,7 +8,7 @@ use crate::metrics::RateInterval;
 
 /// Largest scores of healthy channels that the tail is fitted to.
 const TAIL_PEAKS: usize = 40;
-/// Alarms due from which on a threshold is what they lie above: it needs no tail.
+/// Alarms due from which on the last of them is the threshold: it needs no tail.
 const ENOUGH_DUE: f64 = 3.0;
 
 /// Healthy runs of scores, step by step.

@@ -9,6 +9,9 @@ const SILENT_SNR: f64 = 4.0;
 /// Where the signal stands well out of the noise, a quarter of its power is no accident.
 const FADED_SHARE: f64 = 0.25;
 
+/// A signal that was silent is heard again after so many integrations with power. By chance so many happen once in 3e6.
+const HEARD_AFTER: u32 = 3;
+
 /// After so many integrations a signal is gone. By chance so many happen once in 1e11.
 const GONE_AFTER: u32 = 5;
 
@@ -19,9 +22,27 @@ pub(super) struct Fade {
     integrations: u32,
     /// Whether the last of them held noise alone.
     is_silent: bool,
+    /// Successive integrations with power since it was silent.
+    heard: u32,
 }
 
 impl Fade {
+    /// As [`Self::watch`], of a signal whose usual C/N0 follows it down: once silent it stays so until it is heard again.
+    pub(super) fn watch_on(&mut self, now_hz: f64, usual_hz: f64, interval_s: f64, tick: u64) {
+        if !self.is_silent() {
+            return self.watch(now_hz, usual_hz, interval_s, tick);
+        }
+        self.integrations = self.integrations.saturating_add(1);
+        self.heard = if now_hz * interval_s < SILENT_SNR {
+            0
+        } else {
+            self.heard + 1
+        };
+        if self.heard >= HEARD_AFTER {
+            *self = Self::default();
+        }
+    }
+
     /// Takes the C/N0 of one integration that began at `tick`, of a signal of `usual_hz`.
     pub(super) fn watch(&mut self, now_hz: f64, usual_hz: f64, interval_s: f64, tick: u64) {
         let faded = is_strong(usual_hz, interval_s) && now_hz < FADED_SHARE * usual_hz;
@@ -80,6 +101,24 @@ mod tests {
         fade.watch(2600.0, 1e4, 0.01, 60);
         assert_eq!(fade.since_tick(), None);
         assert!(!fade.is_silent());
+    }
+
+    #[test]
+    fn silence_lasts_while_the_usual_power_falls_with_it() {
+        let mut fade = Fade::default();
+        for tick in 0..500 {
+            // Smoothed over a second; noise alone has power now and then.
+            let usual_hz = 1e4 * (-0.01 * tick as f64).exp();
+            let now_hz = if tick % 50 < 2 { 500.0 } else { 50.0 };
+            fade.watch_on(now_hz, usual_hz, 0.01, tick);
+            assert!(fade.is_silent() || tick < 4, "{tick}");
+        }
+        // It comes back weaker than it was.
+        for tick in 500..503 {
+            assert!(fade.is_silent());
+            fade.watch_on(1000.0, 10.0, 0.01, tick);
+        }
+        assert!(!fade.is_silent() && fade.since_tick().is_none());
     }
 
     #[test]

@@ -139,6 +139,7 @@ impl Steady {
             let presence = Presence::known(self.cn0_hz);
             self.helm = Helm::Navigation(Box::new(Steered::new(presence)));
             self.pre_filter.clear();
+            self.fade = Fade::default();
         }
         if let Helm::Navigation(steered) = &mut self.helm {
             steered.shifted(shift);
@@ -330,8 +331,12 @@ impl Steady {
     }
 
     fn watch_fade(&mut self, now_hz: f64, tick: u64) {
-        self.fade
-            .watch(now_hz, self.cn0_hz, self.interval_s(), tick);
+        let (usual_hz, interval_s) = (self.cn0_hz, self.interval_s());
+        if self.is_steered() {
+            self.fade.watch(now_hz, usual_hz, interval_s, tick);
+        } else {
+            self.fade.watch_on(now_hz, usual_hz, interval_s, tick);
+        }
         // Without waiting for the smoothed C/N0 to fall.
         if self.fade.shows_it_gone()
             && self.settings.steered.silence == Silence::LeftOut

@@ -220,6 +220,27 @@ fn small() -> String {
 }
 
 #[test]
+fn health_that_six_bits_cannot_be_is_not_good() {
+    for (written, read) in [
+        (" 0.000000000000E+00", 0),
+        (" 6.300000000000E+01", 63),
+        (" 6.400000000000E+01", 63),
+        ("-1.000000000000E+00", 63),
+        (" 5.000000000000E-01", 63),
+    ] {
+        let mut lines: Vec<String> = small().lines().map(str::to_owned).collect();
+        let at = lines
+            .iter()
+            .position(|line| line.starts_with("G02"))
+            .unwrap()
+            + 6;
+        lines[at].replace_range(23..42, written);
+        let file = from_memory(lines.join("\n").as_bytes()).unwrap();
+        assert_eq!(file.ephemerides[0].health, read, "{written}");
+    }
+}
+
+#[test]
 fn what_is_wrong_is_named_with_its_line() {
     let good = small();
     assert_eq!(from_memory(good.as_bytes()).unwrap().leap_seconds, Some(18));

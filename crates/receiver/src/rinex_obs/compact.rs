@@ -212,4 +212,22 @@ mod tests {
         arc.take(format!("1&{}", i64::MAX).as_bytes()).unwrap();
         assert!(arc.take(b"1").is_err());
     }
+
+    #[test]
+    fn an_epoch_in_full_begins_every_satellite_anew() {
+        let layout = Layout {
+            places: [Some(0), None, None, None],
+            count: 1,
+        };
+        let mut compact = Compact::default();
+        let mut read = |epoch: &[u8], line: &[u8]| {
+            compact.epoch_line(epoch).unwrap();
+            compact.satellite(7, line, &layout)
+        };
+        // Loss of lock is written once and stands until it is replaced.
+        assert_eq!(read(b"> 1", b"1&100 1").unwrap()[0], Some((100, b'1')));
+        assert_eq!(read(b"  2", b"5").unwrap()[0], Some((105, b'1')));
+        assert_eq!(read(b"> 3", b"1&110").unwrap()[0], Some((110, b' ')));
+        assert!(read(b"> 4", b"5").is_err(), "no arc was begun");
+    }
 }

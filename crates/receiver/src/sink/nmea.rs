@@ -282,6 +282,9 @@ mod tests {
             sink.record(&Record::Channel(channel(0.1, prn))).unwrap();
         }
         sink.record(&Record::Pvt(pvt(0.1))).unwrap();
+        // Of the others nothing is heard any more.
+        sink.record(&Record::Channel(channel(0.2, 12))).unwrap();
+        sink.record(&Record::Pvt(pvt(0.2))).unwrap();
         sink.finish().unwrap();
         let text = std::fs::read_to_string(folder.path().join(FILE_NAME)).unwrap();
         let lines: Vec<&str> = text.lines().collect();
@@ -302,6 +305,8 @@ mod tests {
             "{}",
             lines[2]
         );
+        let last = lines.iter().rfind(|line| line.starts_with("$GPGSA"));
+        assert!(last.unwrap().starts_with("$GPGSA,A,3,12,,,"), "{last:?}");
         assert!(lines[3].contains(",,,,,0.600,0.500,1.100*"), "{}", lines[3]);
         assert!(
             lines[4].starts_with("$GPGSV,1,1,04,07,70,010,4"),

@@ -25,7 +25,7 @@ use crate::train::plan::Plan;
 const MISLEADING: f64 = 4.0;
 /// Epochs before count for nothing: the filter settles, s.
 const SETTLED_S: f64 = 10.0;
-/// Largest error and stated deviation that are drawn, m ...
+/// Largest error and stated deviation that are drawn, m: larger ones lie on the edge ...
 const DRAWN_M: f64 = 60.0;
 /// ... and how far apart dots are that do not hide each other, m.
 const DOT_M: f64 = 0.25;
@@ -268,8 +268,8 @@ pub fn stanford(consequences: &[Consequence]) -> Result<String> {
         };
         Chart {
             caption: all.label.to_owned(),
-            x: "four stated deviations (m)",
-            y: "horizontal error (m)",
+            x: "four stated deviations (m, 60 and more at the edge)",
+            y: "horizontal error (m, 60 and more at the edge)",
             series: vec![
                 series("nobody left out", BLUE, &|e| !e.alarmed && !e.misleads()),
                 series("a satellite left out", GREEN, &|e| e.alarmed),
@@ -291,9 +291,8 @@ pub fn stanford(consequences: &[Consequence]) -> Result<String> {
 /// What is stated of errors and what they are, m, one dot for all that would lie on it.
 fn dots<'a>(epochs: impl Iterator<Item = &'a Epoch>) -> Vec<(f64, f64)> {
     let points = epochs.map(|e| (MISLEADING * e.sigma_m, e.error_m));
-    let drawn = points.filter(|(stated, error)| stated.max(*error) < DRAWN_M);
-    let place = |m: f64| (m / DOT_M) as u32;
-    let places: BTreeSet<_> = drawn.map(|(x, y)| (place(x), place(y))).collect();
+    let place = |m: f64| (m.min(DRAWN_M) / DOT_M) as u32;
+    let places: BTreeSet<_> = points.map(|(x, y)| (place(x), place(y))).collect();
     let middle = |place: u32| (f64::from(place) + 0.5) * DOT_M;
     let dots = places.into_iter();
     dots.map(|(x, y)| (middle(x), middle(y))).collect()
@@ -348,6 +347,17 @@ impl fmt::Display for Table<'_> {
 mod tests {
     use super::*;
     use crate::scenario::fault::Span;
+
+    #[test]
+    fn no_error_is_too_large_to_be_drawn() {
+        let epoch = |error_m, sigma_m| Epoch {
+            error_m,
+            sigma_m,
+            alarmed: false,
+        };
+        let far = dots([epoch(5000.0, 2.0), epoch(1.0, 900.0)].iter());
+        assert_eq!(far, [(8.125, 60.125), (60.125, 1.125)]);
+    }
 
     #[test]
     fn what_befell_no_fault_of_its_own_is_wrongly_excluded() {

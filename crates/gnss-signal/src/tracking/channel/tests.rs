@@ -192,3 +192,32 @@ fn a_short_stretch_already_has_an_epoch() {
     // Four reported sigmas.
     assert!(code_error(&signal, &epoch).powi(2) < 16.0 * epoch.code_variance_chips2);
 }
+
+#[test]
+fn a_channel_released_late_does_not_go_back_to_its_start() {
+    // Bits are known within half a second; navigation steers on for three.
+    let mut signal = IdealSignal::new(45.0, 11);
+    let mut run = Run::new(&signal, 0.0, 0.0);
+    let rate_hz = signal.front_end.sample_rate_hz;
+    let mut now_s = 0.0;
+    for k in 1..=150 {
+        now_s = f64::from(k) * 0.02;
+        run.to(&mut signal, now_s);
+        let doppler_hz = signal.doppler_hz + signal.doppler_rate_hz_s * now_s;
+        let to = Steering {
+            tick: (now_s * rate_hz).round() as u64,
+            code_phase_chips: signal.chips_at(now_s).rem_euclid(1023.0),
+            periods_into_bit: None,
+            code_rate_hz: 1.023e6 * (1.0 + doppler_hz / 1575.42e6),
+            doppler_hz,
+        };
+        assert!(run.channel.steer_early(&to));
+    }
+    run.channel.release(1e-4);
+    let start_s = run.channel.replica().unwrap().start_tick as f64 / rate_hz;
+    // Two seconds of samples are kept.
+    assert!(now_s - start_s < 1.6 && start_s <= now_s, "{start_s} s");
+    let epoch = run.to(&mut signal, 5.0).unwrap();
+    assert_eq!(epoch.lock, Lock::Carrier);
+    assert!(code_error(&signal, &epoch).abs() < 0.05);
+}

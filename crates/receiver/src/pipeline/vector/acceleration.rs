@@ -11,6 +11,9 @@ use nalgebra::Vector3;
 const SPAN_S: f64 = 0.2;
 /// An acceleration below two deviations of its noise is none: fed back, noise would grow.
 const SIGNIFICANT_SIGMAS2: f64 = 4.0;
+/// One that is known to no better than this, 1 g, is none either, (m/s^2)^2: what a start says of its first velocities may
+/// be too little, and a prediction by a false acceleration makes velocities that bear it out.
+const WORST_VARIANCE_M2_S4: f64 = 100.0;
 
 /// Velocities of the last epochs.
 #[derive(Debug, Clone, Default)]
@@ -53,6 +56,9 @@ impl Velocities {
         }
         let mean = (after.velocity_mps - before.velocity_mps) / span_s;
         let noise = (before.variance_m2_s2 + after.variance_m2_s2) / (span_s * span_s);
+        if noise > WORST_VARIANCE_M2_S4 {
+            return Vector3::zeros();
+        }
         mean * (1.0 - SIGNIFICANT_SIGMAS2 * noise / mean.norm_squared()).max(0.0)
     }
 }
@@ -75,18 +81,19 @@ pub(super) fn change_of_rate_mps(
 mod tests {
     use super::*;
 
-    /// The acceleration by 0.2 s of a velocity that grows by 1 m/s an epoch, its first `unsure` known to 7 m/s.
-    fn found(unsure: u32) -> f64 {
+    /// The acceleration by 0.2 s of a velocity that grows by `step_mps` an epoch, its first known to `first_mps` in each
+    /// direction.
+    fn found(step_mps: f64, first_mps: f64) -> f64 {
         let mut velocities = Velocities::default();
         for k in 0..=10 {
             let state = NavState {
                 time: GpsTime::new(2507, 0.02 * f64::from(k)),
                 position_ecef_m: Vector3::zeros(),
-                velocity_ecef_mps: Vector3::new(f64::from(k), 0.0, 0.0),
+                velocity_ecef_mps: Vector3::new(step_mps * f64::from(k), 0.0, 0.0),
                 clock_bias_m: 0.0,
                 clock_drift_mps: 0.0,
             };
-            let sigma_mps = if k < unsure { 7.0 } else { 0.1 };
+            let sigma_mps = if k == 0 { first_mps } else { 0.1 };
             velocities.remember(&state, &(Covariance::identity() * sigma_mps * sigma_mps));
         }
         velocities.mean_acceleration_mps2(true).x
@@ -95,7 +102,10 @@ mod tests {
     #[test]
     fn a_velocity_found_only_now_is_no_acceleration() {
         // 50 m/s^2 less the part that is noise.
-        assert!((found(0) - 50.0).abs() < 0.2, "{}", found(0));
-        assert_eq!(found(1), 0.0);
+        let sure = found(1.0, 0.1);
+        assert!((sure - 50.0).abs() < 0.2, "{sure}");
+        assert_eq!(found(1.0, 7.0), 0.0);
+        // However large it is: what is claimed of the first may be too little.
+        assert_eq!(found(5.0, 2.0), 0.0);
     }
 }
