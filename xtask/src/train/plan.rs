@@ -72,13 +72,13 @@ impl Series {
     };
     /// What thresholds are found and false alarms counted by.
     pub const HEALTHY: Self = Self {
-        seed: 19,
-        week: 2587,
+        seed: 21,
+        week: 2603,
     };
     /// What is judged by.
     pub const TEST: Self = Self {
-        seed: 20,
-        week: 2595,
+        seed: 22,
+        week: 2611,
     };
     /// What models are tested on that have not learned from all there is.
     pub const GENERALISATION: Self = Self {
