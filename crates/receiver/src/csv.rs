@@ -1,25 +1,23 @@
 //! Reads CSV files with a header, line by line.
 
-use std::fs::File;
-use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
 use crate::ReceiverError;
+use crate::lines::Lines;
 
 /// Rows of a CSV file with a header, reduced to the columns asked for.
 pub(crate) struct Table {
     path: PathBuf,
-    lines: std::io::Lines<BufReader<File>>,
+    lines: Lines,
     columns: Vec<usize>,
     names: Rc<[String]>,
-    line: usize,
 }
 
 /// One row, reduced to the columns asked for.
 pub(crate) struct Row {
     path: PathBuf,
-    line: usize,
+    line: u64,
     cells: Vec<String>,
     names: Rc<[String]>,
 }
@@ -31,12 +29,9 @@ impl Table {
             path: path.to_owned(),
             source,
         };
-        let mut lines = BufReader::new(File::open(path).map_err(file_error)?).lines();
-        let header = lines
-            .next()
-            .transpose()
-            .map_err(file_error)?
-            .unwrap_or_default();
+        let mut lines = Lines::open(path).map_err(file_error)?;
+        lines.advance().map_err(file_error)?;
+        let header = String::from_utf8_lossy(lines.current()).into_owned();
         let titles: Vec<&str> = header.trim().split(',').map(str::trim).collect();
         let column = |name: &&str| {
             let found = titles.iter().position(|title| title == name);
@@ -48,7 +43,6 @@ impl Table {
             lines,
             columns: names.iter().map(column).collect::<Result<_, _>>()?,
             names: names.iter().map(|name| (*name).to_owned()).collect(),
-            line: 1,
         })
     }
 }
@@ -58,14 +52,15 @@ impl Iterator for Table {
 
     fn next(&mut self) -> Option<Self::Item> {
         loop {
-            let line = match self.lines.next()? {
-                Ok(line) => line,
+            match self.lines.advance() {
+                Ok(true) => {}
+                Ok(false) => return None,
                 Err(source) => {
                     let path = self.path.clone();
                     return Some(Err(ReceiverError::File { path, source }));
                 }
-            };
-            self.line += 1;
+            }
+            let line = String::from_utf8_lossy(self.lines.current());
             if line.trim().is_empty() {
                 continue;
             }
@@ -73,7 +68,7 @@ impl Iterator for Table {
             let cell = |column: &usize| cells.get(*column).unwrap_or(&"").trim().to_owned();
             return Some(Ok(Row {
                 path: self.path.clone(),
-                line: self.line,
+                line: self.lines.number(),
                 cells: self.columns.iter().map(cell).collect(),
                 names: Rc::clone(&self.names),
             }));

@@ -8,6 +8,7 @@ pub mod cost;
 mod csv;
 mod error;
 pub mod inspect;
+mod lines;
 pub mod models;
 pub mod pipeline;
 pub mod progress;

@@ -139,11 +139,7 @@ fn inputs(config: &RunConfig) -> Vec<PathBuf> {
 
 /// Monitors whose scores are written.
 fn monitors(config: &RunConfig) -> Vec<String> {
-    let running = config
-        .monitors
-        .iter()
-        .filter(|m| config.mode == Mode::Vector || **m == MonitorChoice::Ewma);
-    let names = running.map(|monitor| monitor.name());
+    let names = config.watching().map(MonitorChoice::name);
     names
         .chain(config.raim.scored())
         .map(str::to_owned)

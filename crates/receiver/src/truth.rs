@@ -276,6 +276,8 @@ mod tests {
             "{message}"
         );
         assert!(truth("").unwrap_err().to_string().contains("no row"));
+        let message = truth(&"0".repeat(1 << 20)).unwrap_err().to_string();
+        assert!(message.contains("line 2 is longer than"), "{message}");
     }
 
     #[test]

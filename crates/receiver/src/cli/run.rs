@@ -6,7 +6,7 @@ use gnss_signal::{IfCorrelatorBank, InstructionSet};
 
 use super::{print, with_files};
 use crate::ReceiverError;
-use crate::config::{Isa, RunOptions};
+use crate::config::{Isa, MonitorChoice, RunConfig, RunOptions};
 use crate::samples;
 use crate::session::Session;
 
@@ -22,7 +22,20 @@ pub(super) fn run(options: RunOptions, out: &mut dyn Write) -> Result<(), Receiv
         .with_search_threads(config.threads);
     let received = session.run(bank);
     progress.finish();
-    print(out, &with_files(config.out.as_deref(), &received?))
+    let idle = idle(&config).unwrap_or_default();
+    let summary = with_files(config.out.as_deref(), &received?);
+    print(out, &format!("{idle}{summary}"))
+}
+
+/// Says which monitors were asked for in vain.
+fn idle(config: &RunConfig) -> Option<String> {
+    let names: Vec<_> = config.idle_monitors().map(MonitorChoice::name).collect();
+    let said = format!(
+        "{:<12}{} not used: only in --mode vector\n",
+        "monitors",
+        names.join(", ")
+    );
+    (!names.is_empty()).then_some(said)
 }
 
 fn instruction_set(isa: Isa) -> InstructionSet {

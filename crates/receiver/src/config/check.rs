@@ -311,7 +311,8 @@ impl Checks<'_> {
         let choices: Vec<_> = named.into_iter().chain([("none", None)]).collect();
         let chosen = |name: &String| self.choice("monitor", Some(name), "", &choices);
         if given.monitor.is_empty() {
-            return Ok(vec![Innovation]);
+            let default = (self.mode(given)? == Mode::Vector).then_some(Innovation);
+            return Ok(default.into_iter().collect());
         }
         let all = given
             .monitor

@@ -171,6 +171,20 @@ pub struct RunConfig {
     pub threads: usize,
 }
 
+impl RunConfig {
+    /// Monitors that watch in this mode.
+    pub fn watching(&self) -> impl Iterator<Item = MonitorChoice> {
+        let all = self.monitors.iter().copied();
+        all.filter(|monitor| self.mode == Mode::Vector || *monitor == MonitorChoice::Ewma)
+    }
+
+    /// Monitors that were asked for and have nothing to watch in this mode.
+    pub fn idle_monitors(&self) -> impl Iterator<Item = MonitorChoice> {
+        let all = self.monitors.iter().copied();
+        all.filter(|monitor| self.watching().all(|watching| watching != *monitor))
+    }
+}
+
 /// Everything `receiver acquire` needs to know.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AcquireConfig {

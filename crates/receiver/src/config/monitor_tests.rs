@@ -32,13 +32,19 @@ fn each_runs_once_and_none_stands_alone() {
             sample_rate: Some(2e6),
             ..options(text)
         };
-        options.check().map(|config| config.monitors)
+        options.check().map(|config| {
+            let idle: Vec<_> = config.idle_monitors().collect();
+            (config.monitors, idle)
+        })
     };
     use MonitorChoice::{Innovation, Lstm};
-    assert_eq!(check("").unwrap(), [Innovation]);
-    assert_eq!(check("monitor = 'none'").unwrap(), []);
+    let vector = |text: &str| check(&format!("mode = 'vector'\n{text}")).map(|found| found.0);
+    assert_eq!(check("").unwrap(), (vec![], vec![]));
+    assert_eq!(vector("").unwrap(), [Innovation]);
+    assert_eq!(check("monitor = ['lstm', 'ewma']").unwrap().1, [Lstm]);
+    assert_eq!(vector("monitor = 'none'").unwrap(), []);
     assert_eq!(
-        check("monitor = ['lstm', 'innovation', 'lstm']").unwrap(),
+        vector("monitor = ['lstm', 'innovation', 'lstm']").unwrap(),
         [Innovation, Lstm]
     );
     let error = check("monitor = ['none', 'svm']").unwrap_err().to_string();

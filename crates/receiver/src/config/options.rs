@@ -52,7 +52,7 @@ pub struct RunOptions {
     #[arg(long, value_name = "FILTER")]
     pub filter: Option<String>,
     /// Monitor of every channel: ewma (shape of the correlation); in vector mode also innovation, svm,
-    /// lstm; or none; may be repeated [default: innovation]
+    /// lstm; or none; may be repeated [default: innovation, in vector mode]
     #[arg(long, value_name = "MONITOR")]
     #[serde(deserialize_with = "one_or_several")]
     pub monitor: Vec<String>,

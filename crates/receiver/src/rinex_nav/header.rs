@@ -3,7 +3,8 @@
 use gnss_nav::Klobuchar;
 
 use super::message::real;
-use crate::rinex_text::{Failure, Lines, columns, label, number, shown, version};
+use crate::lines::Lines;
+use crate::rinex_text::{Failure, columns, label, number, shown, version};
 
 /// What a header says of GPS.
 #[derive(Debug, Clone, Copy, Default)]

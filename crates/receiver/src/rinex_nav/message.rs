@@ -2,7 +2,8 @@
 
 use gnss_nav::{Ephemeris, GpsTime, SatelliteId};
 
-use crate::rinex_text::{Failure, Lines, Stamp, columns, number, shown};
+use crate::lines::Lines;
+use crate::rinex_text::{Failure, Stamp, columns, number, shown};
 
 /// Lines after the first, of four numbers each.
 const ORBIT_LINES: usize = 7;

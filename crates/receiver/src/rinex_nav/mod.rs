@@ -15,7 +15,8 @@ use std::path::Path;
 use gnss_nav::{Ephemeris, Klobuchar, SatelliteId};
 
 use crate::ReceiverError;
-use crate::rinex_text::{Failure, Lines};
+use crate::lines::Lines;
+use crate::rinex_text::Failure;
 
 /// What a RINEX navigation file says about GPS.
 #[derive(Debug, Clone, PartialEq)]

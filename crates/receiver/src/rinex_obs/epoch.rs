@@ -2,7 +2,8 @@
 
 use gnss_nav::GpsTime;
 
-use crate::rinex_text::{Failure, Lines, Stamp, columns, number, shown};
+use crate::lines::Lines;
+use crate::rinex_text::{Failure, Stamp, columns, number, shown};
 
 /// What follows the line of an epoch.
 #[derive(Debug, Clone, Copy, PartialEq)]

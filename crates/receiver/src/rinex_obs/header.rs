@@ -2,7 +2,8 @@
 
 use nalgebra::Vector3;
 
-use crate::rinex_text::{Failure, Lines, columns, label, number, shown, version};
+use crate::lines::Lines;
+use crate::rinex_text::{Failure, columns, label, number, shown, version};
 
 /// What a header says of GPS L1 C/A.
 #[derive(Debug, Clone, Default, PartialEq)]

@@ -18,7 +18,8 @@ use std::path::{Path, PathBuf};
 use gnss_nav::{GpsTime, SatelliteId};
 
 use crate::ReceiverError;
-use crate::rinex_text::{Failure, Lines, number, shown};
+use crate::lines::Lines;
+use crate::rinex_text::{Failure, number, shown};
 use compact::{Compact, Field};
 use epoch::{EpochHead, Kind, list_column};
 use header::{Reading, WANTED};

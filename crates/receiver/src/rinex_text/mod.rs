@@ -1,15 +1,16 @@
 //! What RINEX files of every kind have in common: numbered lines of columns, times, and what is
 //! said of a damaged one.
 
-mod lines;
+mod columns;
 mod stamp;
 
 use std::io;
 use std::path::Path;
 
 use crate::ReceiverError;
+use crate::lines::Lines;
 
-pub(crate) use lines::{Lines, columns, label, number, shown};
+pub(crate) use columns::{columns, label, number, shown};
 pub(crate) use stamp::Stamp;
 
 /// Why a file cannot be read on.

@@ -2,7 +2,7 @@
 
 use gnss_nav::{Calendar, GpsTime};
 
-use super::lines::{columns, number};
+use super::{columns, number};
 
 /// Columns of year, month, day, hour, minute and of the second.
 #[derive(Debug, Clone, Copy)]

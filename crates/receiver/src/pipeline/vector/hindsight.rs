@@ -242,3 +242,81 @@ impl VectorTracking {
         Ok(innovations)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use gnss_nav::filter::Disposition::{Exclude, Use};
+
+    use super::*;
+
+    const DEWEIGHT: Disposition = Disposition::Deweight {
+        variance_factor: 100.0,
+    };
+
+    fn told(dispositions: &[(u8, Disposition)]) -> Vec<(SatelliteId, Disposition)> {
+        let told = dispositions.iter();
+        told.map(|(prn, d)| (SatelliteId::gps(*prn), *d)).collect()
+    }
+
+    /// An epoch `tow_s` into the week of which nothing matters but when it was and what was told.
+    fn taken(tow_s: f64, dispositions: &[(u8, Disposition)]) -> Taken {
+        let receive_time = GpsTime::new(2600, tow_s);
+        Taken {
+            before: Before {
+                state: NavState {
+                    time: receive_time,
+                    position_ecef_m: Vector3::zeros(),
+                    velocity_ecef_mps: Vector3::zeros(),
+                    clock_bias_m: 0.0,
+                    clock_drift_mps: 0.0,
+                },
+                covariance: Covariance::zeros(),
+                velocities: Velocities::default(),
+            },
+            measured: true,
+            receive_time,
+            drift_variance_m2_s2: 0.0,
+            acceleration_mps2: Vector3::zeros(),
+            measurements: Vec::new(),
+            ages_s: Vec::new(),
+            reaches: Vec::new(),
+            shown: Vec::new(),
+            told: told(dispositions),
+        }
+    }
+
+    fn hindsight(epochs: &[&[(u8, Disposition)]]) -> Hindsight {
+        let mut hindsight = Hindsight::default();
+        for (tow_s, dispositions) in (0..).map(f64::from).zip(epochs) {
+            hindsight.keep(taken(tow_s, dispositions), 10.0);
+        }
+        hindsight
+    }
+
+    #[test]
+    fn faulty_anew_is_what_was_used_when_last_told_of() {
+        let used = hindsight(&[&[(1, Use), (2, Use)], &[(2, Use)]]);
+        // Satellite 1 was silent at the last epoch; nothing was ever told of 3.
+        assert_eq!(
+            used.newly_faulty(&told(&[(1, Exclude), (2, DEWEIGHT), (3, Exclude)])),
+            told(&[(1, Exclude), (2, DEWEIGHT)])
+        );
+        assert_eq!(used.newly_faulty(&told(&[(1, Use), (2, Use)])), []);
+        let left_out = hindsight(&[&[(1, Use), (2, Use)], &[(1, Exclude), (2, DEWEIGHT)]]);
+        let faulty = told(&[(1, Exclude), (2, Exclude)]);
+        assert_eq!(left_out.newly_faulty(&faulty), []);
+    }
+
+    #[test]
+    fn an_epoch_in_which_the_filter_was_moved_is_not_kept() {
+        let mut hindsight = hindsight(&[&[(1, Use)], &[(1, Use)]]);
+        hindsight.clear();
+        hindsight.keep(taken(2.0, &[(1, Use)]), 10.0);
+        assert_eq!(hindsight.epochs.len(), 0);
+        for tow_s in [3.0, 4.0, 13.5] {
+            hindsight.keep(taken(tow_s, &[(1, Use)]), 10.0);
+        }
+        // The first is more than ten seconds before the last.
+        assert_eq!(hindsight.epochs.len(), 2);
+    }
+}

@@ -460,21 +460,17 @@ impl VectorTracking {
         {
             if let Some(member) = epoch.members.iter_mut().find(|m| m.satellite == *satellite) {
                 member.innovation = Some(*innovation);
-                let skipped = |reason| {
-                    let code = Observable::Pseudorange;
-                    let mut all = update.skipped.iter();
-                    all.any(|s| {
-                        s.satellite == *satellite && s.observable == code && s.reason == reason
-                    })
-                };
-                member.used = !skipped(SkipReason::Gate) && !skipped(SkipReason::Excluded);
-                member.disposition = Some(*disposition).filter(|_| !skipped(SkipReason::BelowMask));
+                let code = Observable::Pseudorange;
+                let mut skipped = update.skipped.iter();
+                let skipped = skipped.find(|s| s.satellite == *satellite && s.observable == code);
+                let below_mask = skipped.is_some_and(|s| s.reason == SkipReason::BelowMask);
+                member.used = skipped.is_none();
+                member.disposition = Some(*disposition).filter(|_| !below_mask);
             }
         }
         let used = |satellite| {
-            let is_used =
-                |m: &Member| m.satellite == satellite && m.used && m.disposition.is_some();
-            epoch.members.iter().any(is_used)
+            let mut members = epoch.members.iter();
+            members.any(|m| m.satellite == satellite && m.used)
         };
         if let Ok(geometry) = innovations.geometry(used)
             && geometry.satellites >= NEEDED
