@@ -8,7 +8,8 @@ use num_complex::Complex64;
 use super::{
     InstructionSet,
     carrier_table::{CarrierTable, TableAmplitude},
-    code_bits::CodeBits,
+    change_sums::{ChangeSums, FRACTION_SHIFT, Grid, Located},
+    code_bits::{BATCH, CodeBits},
     fixed_point::{BLOCK_SAMPLES, Baseband, Interval, Kernel, MOST_CHIPS, within_period},
     lane_table::{LaneTable, LaneTables},
 };
@@ -20,13 +21,11 @@ const LANES: usize = 32;
 /// Vectors of a block.
 const VECTORS: usize = BLOCK_SAMPLES / LANES;
 
-/// Below this half a vector may span more chips than one table look-up reaches.
-pub(super) const LOWEST_SAMPLE_RATE_HZ: f64 = 1.8e6;
-
 /// Chips that `vpshufb` reaches from the first of a window.
 const REACH_CHIPS: f64 = 15.0;
 
-/// Windows of the code that a block looks up, at most: one for each half of a vector.
+/// Windows of the code that a block looks up, at most: one for each half of a vector, which reaches its samples from 1.08 MHz
+/// on, at a code rate 5 % above the nominal one.
 const MOST_WINDOWS: usize = 2 * VECTORS;
 
 /// In-phase and quadrature sums by lane.
@@ -54,23 +53,13 @@ impl Avx2 {
         if !is_supported() {
             return Err(InstructionSet::Avx2.unsupported());
         }
-        // `vpacksswb` takes eight samples of the first half, then eight of the second, in turn.
-        let order = std::array::from_fn(|byte| {
-            let (vector, quarter) = (byte / 32, byte / 16 % 2);
-            let (half, sample) = (byte / 8 % 2, byte % 8);
-            (32 * vector + 16 * half + 8 * quarter + sample) as u8
-        });
         let windows = windows_of_block(sample_rate_hz);
-        let origin = if windows == MOST_WINDOWS {
-            std::array::from_fn(|byte| (byte / 32 * 32 + byte / 16 % 2 * 8) as u8)
-        } else {
-            let samples = BLOCK_SAMPLES / windows;
-            std::array::from_fn(|byte| (byte / samples * samples) as u8)
-        };
+        let samples = BLOCK_SAMPLES / windows;
+        let origin = std::array::from_fn(|byte| (byte / samples * samples) as u8);
         // SAFETY: all bits zero are floats, and the instruction set is there.
         let zero = unsafe { [_mm256_setzero_ps(); 2] };
         Ok(Self {
-            lanes: LaneTables::new(order, origin),
+            lanes: LaneTables::new(origin),
             windows,
             baseband: Baseband::zeroed(),
             phases: [0; MAX_TAPS],
@@ -90,6 +79,8 @@ fn windows_of_block(sample_rate_hz: f64) -> usize {
 }
 
 impl Kernel for Avx2 {
+    const VECTOR: usize = LANES;
+
     fn start(&mut self, interval: &Interval<'_>) {
         self.lanes.select(interval.code_step_chips);
         self.phases = interval.phases;
@@ -117,6 +108,17 @@ impl Kernel for Avx2 {
     ) {
         // SAFETY: an `Avx2` exists only where its instruction set does (`new`).
         unsafe { add(self, interval, samples, carrier, turn) }
+    }
+
+    fn add_changes(
+        &mut self,
+        changes: &mut ChangeSums,
+        interval: &Interval<'_>,
+        len: usize,
+        turn: Complex64,
+    ) {
+        // SAFETY: an `Avx2` exists only where its instruction set does (`new`).
+        unsafe { add_changes(&mut self.baseband, changes, interval, len, turn) };
     }
 
     fn sums(&self, sums: &mut [Complex64]) -> Complex64 {
@@ -214,6 +216,61 @@ fn add_all_taps<const WINDOWS: usize>(chunk: &Chunk<'_>, phases: &mut [u64], sum
     }
 }
 
+#[target_feature(enable = "avx2,fma")]
+pub(super) fn add_changes(
+    baseband: &mut Baseband,
+    changes: &mut ChangeSums,
+    interval: &Interval<'_>,
+    len: usize,
+    turn: Complex64,
+) {
+    changes.add(interval, baseband, len, turn, |grid, batch| {
+        locate(grid, batch)
+    });
+}
+
+/// As [`Grid::locate`].
+#[target_feature(enable = "avx2,fma")]
+fn locate(grid: &Grid<'_>, batch: &[u16; BATCH]) -> Located {
+    let zero = _mm256_setzero_si256();
+    let chip_samples = _mm256_set1_epi32(grid.chip_samples.cast_signed());
+    let origin = _mm256_set1_epi32(grid.origin.cast_signed());
+    let chips = _mm256_srli_epi16::<1>(load(batch));
+    let chips = _mm256_sub_epi16(chips, _mm256_set1_epi16(grid.first_chip.cast_signed()));
+    let rest = _mm256_mulhi_epu16(chips, _mm256_set1_epi16(grid.rest.cast_signed()));
+    let position = |chips, rest| {
+        let position = _mm256_add_epi32(_mm256_mullo_epi32(chips, chip_samples), rest);
+        _mm256_add_epi32(position, origin)
+    };
+    let low = position(
+        _mm256_unpacklo_epi16(chips, zero),
+        _mm256_unpacklo_epi16(rest, zero),
+    );
+    let high = position(
+        _mm256_unpackhi_epi16(chips, zero),
+        _mm256_unpackhi_epi16(rest, zero),
+    );
+    let most = _mm256_set1_epi32(0xffff);
+    let next = |position| _mm256_srli_epi32::<16>(_mm256_add_epi32(position, most));
+    let at = _mm256_packus_epi32(next(low), next(high));
+    let fraction = _mm256_packus_epi32(_mm256_and_si256(low, most), _mm256_and_si256(high, most));
+    let fraction = _mm256_sub_epi16(zero, fraction);
+    let fraction = _mm256_srli_epi16::<{ FRACTION_SHIFT.cast_signed() }>(fraction);
+    let passed = grid.limits.iter().fold(zero, |passed, limit| {
+        let passes = _mm256_cmpgt_epi16(fraction, _mm256_set1_epi16(*limit));
+        _mm256_sub_epi16(passed, passes)
+    });
+    let bit = _mm256_and_si256(load(batch), _mm256_set1_epi16(1));
+    let slot = _mm256_add_epi16(_mm256_add_epi16(passed, passed), bit);
+    // SAFETY: vectors of 16 numbers of 16 bits, as arrays of them.
+    unsafe {
+        Located {
+            at: std::mem::transmute::<__m256i, [u16; BATCH]>(at),
+            slot: std::mem::transmute::<__m256i, [u16; BATCH]>(slot),
+        }
+    }
+}
+
 /// What the taps of one chunk share.
 struct Chunk<'a> {
     baseband: &'a Baseband,
@@ -235,8 +292,9 @@ fn add_taps<const TAPS: usize, const WINDOWS: usize>(
     let mut now = *phases;
     let origins: [usize; MOST_WINDOWS] =
         std::array::from_fn(|half| chunk.lanes.origin_chips(half * LANES / 2) & 127);
-    let (i_blocks, _) = chunk.baseband.i.as_chunks::<BLOCK_SAMPLES>();
-    let (q_blocks, _) = chunk.baseband.q.as_chunks::<BLOCK_SAMPLES>();
+    let [i, q] = chunk.baseband.parts();
+    let (i_blocks, _) = i.as_chunks::<BLOCK_SAMPLES>();
+    let (q_blocks, _) = q.as_chunks::<BLOCK_SAMPLES>();
     for (i, q) in i_blocks.iter().zip(q_blocks).take(chunk.blocks) {
         let (i, q) = (vectors(i), vectors(q));
         for tap in 0..TAPS {
@@ -317,21 +375,22 @@ fn wipe_off_real(
     carrier: &CarrierTable,
     out: &mut Baseband,
 ) -> [__m256i; 2] {
-    let shift = _mm_cvtsi32_si128(shift);
-    let mut totals = [_mm256_setzero_si256(); 2];
+    // A sample is moved to the top of a 16-bit lane, then down to its shifted place.
+    let down = _mm_cvtsi32_si128(8 - shift);
+    let zero = _mm256_setzero_si256();
+    let mut totals = [zero; 2];
     let (samples, _) = samples.as_chunks::<LANES>();
     let (re, _) = carrier.re.as_chunks::<{ LANES / 2 }>();
     let (im, _) = carrier.im.as_chunks::<{ LANES / 2 }>();
-    let (out_i, _) = out.i.as_chunks_mut::<LANES>();
-    let (out_q, _) = out.q.as_chunks_mut::<LANES>();
+    let [out_i, out_q] = out.parts_mut();
+    let (out_i, _) = out_i.as_chunks_mut::<LANES>();
+    let (out_q, _) = out_q.as_chunks_mut::<LANES>();
     let table = re.as_chunks::<2>().0.iter().zip(im.as_chunks::<2>().0);
     let out = out_i.iter_mut().zip(out_q);
     for ((x, (re, im)), (i, q)) in samples.iter().zip(table).zip(out) {
         let x = load(x);
-        let first = _mm256_cvtepi8_epi16(_mm256_castsi256_si128(x));
-        let second = _mm256_cvtepi8_epi16(_mm256_extracti128_si256::<1>(x));
-        let first = _mm256_sll_epi16(first, shift);
-        let second = _mm256_sll_epi16(second, shift);
+        let first = _mm256_sra_epi16(_mm256_unpacklo_epi8(zero, x), down);
+        let second = _mm256_sra_epi16(_mm256_unpackhi_epi8(zero, x), down);
         let baseband_i = _mm256_packs_epi16(
             _mm256_mulhrs_epi16(first, load(&re[0])),
             _mm256_mulhrs_epi16(second, load(&re[1])),
@@ -362,18 +421,24 @@ fn wipe_off_complex(
     let (samples, _) = halves.as_chunks::<2>();
     let (re, _) = carrier.re.as_chunks::<{ LANES / 2 }>();
     let (im, _) = carrier.im.as_chunks::<{ LANES / 2 }>();
-    let (out_i, _) = out.i.as_chunks_mut::<LANES>();
-    let (out_q, _) = out.q.as_chunks_mut::<LANES>();
+    let [out_i, out_q] = out.parts_mut();
+    let (out_i, _) = out_i.as_chunks_mut::<LANES>();
+    let (out_q, _) = out_q.as_chunks_mut::<LANES>();
     let table = re.as_chunks::<2>().0.iter().zip(im.as_chunks::<2>().0);
     let out = out_i.iter_mut().zip(out_q);
     for ((x, (re, im)), (i, q)) in samples.iter().zip(table).zip(out) {
+        let x = [load(&x[0]), load(&x[1])];
+        // In the order of the table, which packing undoes.
+        let x = [
+            _mm256_permute2x128_si256::<0x20>(x[0], x[1]),
+            _mm256_permute2x128_si256::<0x31>(x[0], x[1]),
+        ];
         let mut wide_i = [_mm256_setzero_si256(); 2];
         let mut wide_q = [_mm256_setzero_si256(); 2];
         for half in 0..2 {
             let (re, im) = (load(&re[half]), load(&im[half]));
-            let x = load(&x[half]);
-            let x_i = _mm256_sra_epi16(_mm256_slli_epi16::<8>(x), down);
-            let x_q = _mm256_and_si256(x, _mm256_set1_epi16(-256));
+            let x_i = _mm256_sra_epi16(_mm256_slli_epi16::<8>(x[half]), down);
+            let x_q = _mm256_and_si256(x[half], _mm256_set1_epi16(-256));
             let x_q = _mm256_sra_epi16(x_q, down);
             wide_i[half] =
                 _mm256_sub_epi16(_mm256_mulhrs_epi16(x_i, re), _mm256_mulhrs_epi16(x_q, im));
@@ -395,4 +460,42 @@ fn add_total(totals: &mut [__m256i; 2], i: __m256i, q: __m256i) {
     let ones = _mm256_set1_epi8(1);
     totals[0] = _mm256_add_epi16(totals[0], _mm256_maddubs_epi16(ones, i));
     totals[1] = _mm256_add_epi16(totals[1], _mm256_maddubs_epi16(ones, q));
+}
+
+#[cfg(test)]
+#[allow(clippy::print_stdout, reason = "a skip must not be silent")]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    use super::*;
+
+    #[test]
+    fn windows_are_located_as_in_plain_rust() {
+        if !is_supported() {
+            println!("SKIPPED: no AVX2");
+            return;
+        }
+        let mut rng = ChaCha8Rng::seed_from_u64(3);
+        for _ in 0..2000 {
+            let limits: [i16; 11] = std::array::from_fn(|_| rng.random_range(0..4096));
+            let first_chip = rng.random_range(0..1030);
+            let grid = Grid {
+                first_chip,
+                origin: rng.random_range(32 << 16..130 << 16),
+                chip_samples: rng.random_range(7 << 16..32 << 16),
+                rest: rng.random(),
+                limits: &limits,
+            };
+            let change = || rng.random_range(2 * first_chip..2 * first_chip + 300);
+            let batch: [u16; BATCH] = std::iter::repeat_with(change)
+                .take(BATCH)
+                .collect::<Vec<_>>()
+                .try_into()
+                .unwrap();
+            // SAFETY: the instruction set is there.
+            let located = unsafe { locate(&grid, &batch) };
+            assert_eq!(located, grid.locate(&batch), "{grid:?} {batch:?}");
+        }
+    }
 }

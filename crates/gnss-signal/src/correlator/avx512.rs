@@ -6,8 +6,9 @@ use std::arch::x86_64::*;
 use num_complex::Complex64;
 
 use super::{
-    InstructionSet,
+    InstructionSet, avx2,
     carrier_table::{CarrierTable, TableAmplitude},
+    change_sums::ChangeSums,
     code_bits::CodeBits,
     fixed_point::{BLOCK_SAMPLES, Baseband, Interval, Kernel, MOST_CHIPS, within_period},
     lane_table::{LaneTable, LaneTables},
@@ -38,7 +39,7 @@ pub(super) fn is_supported() -> bool {
         && is_x86_feature_detected!("avx512bw")
         && is_x86_feature_detected!("avx512vbmi")
         && is_x86_feature_detected!("avx512vnni")
-        && is_x86_feature_detected!("fma")
+        && avx2::is_supported()
 }
 
 impl Avx512 {
@@ -47,17 +48,11 @@ impl Avx512 {
         if !is_supported() {
             return Err(InstructionSet::Avx512.unsupported());
         }
-        // `vpacksswb` takes eight samples of the first half, then eight of the second, in turn.
-        let order = std::array::from_fn(|byte| {
-            let (vector, quarter) = (byte / 64, byte / 16 % 4);
-            let (half, sample) = (byte / 8 % 2, byte % 8);
-            (64 * vector + 32 * half + 8 * quarter + sample) as u8
-        });
         let origin = std::array::from_fn(|byte| (byte / 64 * 64) as u8);
         // SAFETY: all bits zero are floats, and the instruction set is there.
         let zero = unsafe { [_mm512_setzero_ps(); 2] };
         Ok(Self {
-            lanes: LaneTables::new(order, origin),
+            lanes: LaneTables::new(origin),
             baseband: Baseband::zeroed(),
             phases: [0; MAX_TAPS],
             sums: [zero; MAX_TAPS],
@@ -67,6 +62,8 @@ impl Avx512 {
 }
 
 impl Kernel for Avx512 {
+    const VECTOR: usize = LANES;
+
     fn start(&mut self, interval: &Interval<'_>) {
         self.lanes.select(interval.code_step_chips);
         self.phases = interval.phases;
@@ -94,6 +91,17 @@ impl Kernel for Avx512 {
     ) {
         // SAFETY: an `Avx512` exists only where its instruction set does (`new`).
         unsafe { add(self, interval, samples, carrier, turn) }
+    }
+
+    fn add_changes(
+        &mut self,
+        changes: &mut ChangeSums,
+        interval: &Interval<'_>,
+        len: usize,
+        turn: Complex64,
+    ) {
+        // SAFETY: an `Avx512` exists only where its instruction set does (`new`).
+        unsafe { avx2::add_changes(&mut self.baseband, changes, interval, len, turn) };
     }
 
     fn sums(&self, sums: &mut [Complex64]) -> Complex64 {
@@ -198,13 +206,15 @@ fn add_taps<const TAPS: usize>(
     phases: &mut [u64; TAPS],
     sums: &mut [Sums; TAPS],
 ) {
-    let mut in_phase = [_mm512_setzero_si512(); TAPS];
-    let mut quadrature = [_mm512_setzero_si512(); TAPS];
+    // A sum of its own for each vector of a block: one alone would wait for itself.
+    let mut in_phase = [[_mm512_setzero_si512(); VECTORS]; TAPS];
+    let mut quadrature = [[_mm512_setzero_si512(); VECTORS]; TAPS];
     let mut now = *phases;
     let origins: [usize; VECTORS] =
         std::array::from_fn(|vector| chunk.lanes.origin_chips(vector * LANES) & 127);
-    let (i_blocks, _) = chunk.baseband.i.as_chunks::<BLOCK_SAMPLES>();
-    let (q_blocks, _) = chunk.baseband.q.as_chunks::<BLOCK_SAMPLES>();
+    let [i, q] = chunk.baseband.parts();
+    let (i_blocks, _) = i.as_chunks::<BLOCK_SAMPLES>();
+    let (q_blocks, _) = q.as_chunks::<BLOCK_SAMPLES>();
     for (i, q) in i_blocks.iter().zip(q_blocks).take(chunk.blocks) {
         let (i, q) = (vectors(i), vectors(q));
         for tap in 0..TAPS {
@@ -214,15 +224,19 @@ fn add_taps<const TAPS: usize>(
             for (vector, (&i, &q)) in i.iter().zip(&q).enumerate() {
                 let window = load(window(chunk.code, chip + origins[vector]));
                 let code = _mm512_permutexvar_epi8(load(&row[vector]), window);
-                in_phase[tap] = _mm512_dpbusd_epi32(in_phase[tap], code, i);
-                quadrature[tap] = _mm512_dpbusd_epi32(quadrature[tap], code, q);
+                let (in_phase, quadrature) =
+                    (&mut in_phase[tap][vector], &mut quadrature[tap][vector]);
+                *in_phase = _mm512_dpbusd_epi32(*in_phase, code, i);
+                *quadrature = _mm512_dpbusd_epi32(*quadrature, code, q);
             }
             now[tap] = phase + chunk.step;
         }
     }
     *phases = now.map(within_period);
     for tap in 0..TAPS {
-        add_turned(&mut sums[tap], [in_phase[tap], quadrature[tap]], chunk.turn);
+        let total = [in_phase[tap], quadrature[tap]];
+        let total = total.map(|[first, second]| _mm512_add_epi32(first, second));
+        add_turned(&mut sums[tap], total, chunk.turn);
     }
 }
 
@@ -276,21 +290,22 @@ fn wipe_off_real(
     carrier: &CarrierTable,
     out: &mut Baseband,
 ) -> [__m512i; 2] {
-    let shift = _mm_cvtsi32_si128(shift);
-    let mut totals = [_mm512_setzero_si512(); 2];
+    // A sample is moved to the top of a 16-bit lane, then down to its shifted place.
+    let down = _mm_cvtsi32_si128(8 - shift);
+    let zero = _mm512_setzero_si512();
+    let mut totals = [zero; 2];
     let (samples, _) = samples.as_chunks::<LANES>();
     let (re, _) = carrier.re.as_chunks::<{ LANES / 2 }>();
     let (im, _) = carrier.im.as_chunks::<{ LANES / 2 }>();
-    let (out_i, _) = out.i.as_chunks_mut::<LANES>();
-    let (out_q, _) = out.q.as_chunks_mut::<LANES>();
+    let [out_i, out_q] = out.parts_mut();
+    let (out_i, _) = out_i.as_chunks_mut::<LANES>();
+    let (out_q, _) = out_q.as_chunks_mut::<LANES>();
     let table = re.as_chunks::<2>().0.iter().zip(im.as_chunks::<2>().0);
     let out = out_i.iter_mut().zip(out_q);
     for ((x, (re, im)), (i, q)) in samples.iter().zip(table).zip(out) {
         let x = load(x);
-        let first = _mm512_cvtepi8_epi16(_mm512_castsi512_si256(x));
-        let second = _mm512_cvtepi8_epi16(_mm512_extracti64x4_epi64::<1>(x));
-        let first = _mm512_sll_epi16(first, shift);
-        let second = _mm512_sll_epi16(second, shift);
+        let first = _mm512_sra_epi16(_mm512_unpacklo_epi8(zero, x), down);
+        let second = _mm512_sra_epi16(_mm512_unpackhi_epi8(zero, x), down);
         let baseband_i = _mm512_packs_epi16(
             _mm512_mulhrs_epi16(first, load(&re[0])),
             _mm512_mulhrs_epi16(second, load(&re[1])),
@@ -321,18 +336,24 @@ fn wipe_off_complex(
     let (samples, _) = halves.as_chunks::<2>();
     let (re, _) = carrier.re.as_chunks::<{ LANES / 2 }>();
     let (im, _) = carrier.im.as_chunks::<{ LANES / 2 }>();
-    let (out_i, _) = out.i.as_chunks_mut::<LANES>();
-    let (out_q, _) = out.q.as_chunks_mut::<LANES>();
+    let [out_i, out_q] = out.parts_mut();
+    let (out_i, _) = out_i.as_chunks_mut::<LANES>();
+    let (out_q, _) = out_q.as_chunks_mut::<LANES>();
     let table = re.as_chunks::<2>().0.iter().zip(im.as_chunks::<2>().0);
     let out = out_i.iter_mut().zip(out_q);
     for ((x, (re, im)), (i, q)) in samples.iter().zip(table).zip(out) {
+        let x = [load(&x[0]), load(&x[1])];
+        // In the order of the table, which packing undoes.
+        let x = [
+            _mm512_shuffle_i64x2::<0b10_00_10_00>(x[0], x[1]),
+            _mm512_shuffle_i64x2::<0b11_01_11_01>(x[0], x[1]),
+        ];
         let mut wide_i = [_mm512_setzero_si512(); 2];
         let mut wide_q = [_mm512_setzero_si512(); 2];
         for half in 0..2 {
             let (re, im) = (load(&re[half]), load(&im[half]));
-            let x = load(&x[half]);
-            let x_i = _mm512_sra_epi16(_mm512_slli_epi16::<8>(x), down);
-            let x_q = _mm512_and_si512(x, _mm512_set1_epi16(-256));
+            let x_i = _mm512_sra_epi16(_mm512_slli_epi16::<8>(x[half]), down);
+            let x_q = _mm512_and_si512(x[half], _mm512_set1_epi16(-256));
             let x_q = _mm512_sra_epi16(x_q, down);
             wide_i[half] =
                 _mm512_sub_epi16(_mm512_mulhrs_epi16(x_i, re), _mm512_mulhrs_epi16(x_q, im));

@@ -7,6 +7,9 @@ use num_complex::{Complex32, Complex64};
 /// Most samples in a chunk.
 pub(super) const CHUNK_SAMPLES: usize = 1024;
 
+/// Samples within which entries may be in another order.
+const ORDERED: usize = 64;
+
 /// 1.5 * 2^23: added to a small float it leaves the rounded integer in the low bits.
 const ROUND_TO_INTEGER: f32 = 12_582_912.0;
 
@@ -26,6 +29,8 @@ pub(super) struct CarrierTable {
     /// Imaginary parts.
     pub(super) im: [i16; CHUNK_SAMPLES],
     turns: [Complex32; CHUNK_SAMPLES],
+    /// Which of 64 samples each of 64 entries is for.
+    order: [usize; ORDERED],
     /// Uniform in +-1/2, another for each part.
     dither: [[f32; CHUNK_SAMPLES]; 2],
 }
@@ -39,19 +44,28 @@ pub(super) struct TableAmplitude {
 }
 
 impl CarrierTable {
-    pub(super) fn new() -> Self {
+    /// A table for bytes that are unpacked from vectors of `vector` of them: in each of its quarters of 16 bytes the first
+    /// eight come first, and where these end those that come second. One of 16 has the order of the samples.
+    pub(super) fn new(vector: usize) -> Self {
+        let order = std::array::from_fn(|entry| {
+            let (start, entry) = (entry / vector * vector, entry % vector);
+            let (half, eight) = (entry / (vector / 2), entry % (vector / 2) / 8);
+            start + 16 * eight + 8 * half + entry % 8
+        });
+        let dithers = |seed| {
+            let sample = |entry| entry / ORDERED * ORDERED + order[entry % ORDERED];
+            std::array::from_fn(|entry| dither(sample(entry), seed))
+        };
         Self {
             re: [0; CHUNK_SAMPLES],
             im: [0; CHUNK_SAMPLES],
             turns: [Complex32::default(); CHUNK_SAMPLES],
-            dither: [
-                std::array::from_fn(|n| dither(n, 0x9e37_79b1)),
-                std::array::from_fn(|n| dither(n, 0x85eb_ca77)),
-            ],
+            dither: [dithers(0x9e37_79b1), dithers(0x85eb_ca77)],
+            order,
         }
     }
 
-    /// Fills the first `len` entries for a carrier of `step_cycles` a sample, and returns the turn
+    /// Fills the first `len` entries (more than 64) for a carrier of `step_cycles` a sample, and returns the turn
     /// from one chunk of `len` samples to the next.
     #[inline(always)]
     pub(super) fn fill(
@@ -66,6 +80,10 @@ impl CarrierTable {
         self.turns[0] = Complex32::new(1.0, 0.0);
         let mut filled = 1;
         while filled < len {
+            if filled == ORDERED {
+                let (block, _) = self.turns.as_chunks_mut::<ORDERED>();
+                block[0] = self.order.map(|sample| block[0][sample]);
+            }
             let turn = Complex32::new(doubled.re as f32, doubled.im as f32);
             let (known, rest) = self.turns.split_at_mut(filled);
             for (next, known) in rest.iter_mut().zip(known) {
@@ -107,16 +125,19 @@ mod tests {
 
     #[test]
     fn entries_are_the_rounded_carrier() {
-        let mut table = Box::new(CarrierTable::new());
-        for step_cycles in [0.0, 0.25, -0.123_456, 0.499_999, 3.3] {
+        const STEPS_CYCLES: [f64; 5] = [0.0, 0.25, -0.123_456, 0.499_999, 3.3];
+        let vectors = [16, 32, 64].into_iter();
+        for (vector, step_cycles) in vectors.flat_map(|v| STEPS_CYCLES.map(|step| (v, step))) {
+            let mut table = Box::new(CarrierTable::new(vector));
             let amplitude = TableAmplitude {
                 carrier: 32_700.0,
                 dither: 0.0,
             };
             table.fill(CHUNK_SAMPLES, step_cycles, amplitude);
-            for n in 0..CHUNK_SAMPLES {
+            for entry in 0..CHUNK_SAMPLES {
+                let n = entry / ORDERED * ORDERED + table.order[entry % ORDERED];
                 let exact = Complex64::cis(-TAU * step_cycles * n as f64) * 32_700.0;
-                let error = exact - Complex64::new(table.re[n].into(), table.im[n].into());
+                let error = exact - Complex64::new(table.re[entry].into(), table.im[entry].into());
                 // Half a unit of rounding in each part, and ten doublings of f32 rounding
                 // (6e-8 * 32700 each).
                 assert!(error.norm() < 0.75, "{step_cycles} at {n}: {error}");

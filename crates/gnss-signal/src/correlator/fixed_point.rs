@@ -10,7 +10,8 @@ use num_complex::Complex64;
 
 use super::{
     carrier_table::{CHUNK_SAMPLES, CarrierTable, TableAmplitude},
-    code_bits::{CodeBits, code_bits},
+    change_sums::ChangeSums,
+    code_bits::{CodeBits, CodeChanges, code_bits, code_changes},
 };
 use crate::{CA_CODE_LENGTH_CHIPS, FrontEnd, MAX_TAPS, Replica, SignalError};
 
@@ -21,7 +22,7 @@ pub(super) const BLOCK_SAMPLES: usize = 128;
 pub(super) const LOWEST_SAMPLE_RATE_HZ: f64 = 1.15e6;
 
 /// One chip in fixed point.
-const ONE_CHIP: f64 = 4_294_967_296.0;
+pub(super) const ONE_CHIP: f64 = 4_294_967_296.0;
 
 /// One code period in fixed point.
 pub(super) const CODE_PERIOD: u64 = (CA_CODE_LENGTH_CHIPS as u64) << 32;
@@ -36,20 +37,45 @@ pub(super) fn within_period(phase: u64) -> u64 {
     phase.min(phase.wrapping_sub(CODE_PERIOD))
 }
 
-/// Baseband of one chunk.
+/// Baseband of one chunk, with zeros around it.
 #[derive(Debug, Clone)]
 #[repr(C, align(64))]
 pub(super) struct Baseband {
-    pub(super) i: [i8; CHUNK_SAMPLES],
-    pub(super) q: [i8; CHUNK_SAMPLES],
+    i: [i8; PADDED],
+    q: [i8; PADDED],
 }
+
+/// Zeros before and after the baseband of a chunk.
+pub(super) const PAD: usize = 64;
+
+const PADDED: usize = PAD + CHUNK_SAMPLES + PAD;
 
 impl Baseband {
     pub(super) const fn zeroed() -> Self {
         Self {
-            i: [0; CHUNK_SAMPLES],
-            q: [0; CHUNK_SAMPLES],
+            i: [0; PADDED],
+            q: [0; PADDED],
         }
+    }
+
+    /// In-phase and quadrature part.
+    #[inline(always)]
+    pub(super) fn parts(&self) -> [&[i8]; 2] {
+        [&self.i, &self.q].map(|part| &part[PAD..PAD + CHUNK_SAMPLES])
+    }
+
+    #[inline(always)]
+    pub(super) fn parts_mut(&mut self) -> [&mut [i8]; 2] {
+        [&mut self.i, &mut self.q].map(|part| &mut part[PAD..PAD + CHUNK_SAMPLES])
+    }
+
+    /// Both parts with the zeros before and after them, the chunk being `len` samples long.
+    #[inline(always)]
+    pub(super) fn padded(&mut self, len: usize) -> [&[i8; PADDED]; 2] {
+        for part in [&mut self.i, &mut self.q] {
+            part[PAD + len..][..PAD].fill(0);
+        }
+        [&self.i, &self.q]
     }
 }
 
@@ -59,6 +85,7 @@ pub(super) struct Interval<'a> {
     samples: &'a [i8],
     pub(super) complex: bool,
     pub(super) code: &'static CodeBits,
+    pub(super) changes: &'static CodeChanges,
     carrier_phase_cycles: f64,
     carrier_step_cycles: f64,
     /// Code step of a sample, chips.
@@ -89,6 +116,7 @@ impl<'a> Interval<'a> {
             samples,
             complex: front_end.complex,
             code: code_bits(replica.signal),
+            changes: code_changes(replica.signal),
             carrier_phase_cycles: replica.carrier_phase_cycles,
             carrier_step_cycles: replica.carrier_frequency_hz / front_end.sample_rate_hz,
             code_step_chips: replica.code_rate_hz / front_end.sample_rate_hz,
@@ -97,6 +125,14 @@ impl<'a> Interval<'a> {
             shift,
             amplitude,
         })
+    }
+
+    /// The same with one of its taps alone.
+    fn only(&self, tap: usize) -> Self {
+        let mut only = self.clone();
+        only.phases[0] = self.phases[tap];
+        only.taps = 1;
+        only
     }
 
     /// 2 where complex, otherwise 1.
@@ -185,6 +221,9 @@ fn check(front_end: FrontEnd, samples: &[i8], replica: &Replica) -> Result<(), S
 /// Sums are kept over the chunks of an interval: those of the taps, in units of (code bits 0 and 1)
 /// times baseband, and that of the baseband alone.
 pub(super) trait Kernel {
+    /// Bytes of a vector from which samples are unpacked.
+    const VECTOR: usize;
+
     /// Makes ready for `interval` and clears the sums.
     fn start(&mut self, interval: &Interval<'_>);
 
@@ -208,6 +247,15 @@ pub(super) trait Kernel {
         turn: Complex64,
     );
 
+    /// Adds what the taps differ by in the chunk last added, `len` samples long (compiled for the instruction set).
+    fn add_changes(
+        &mut self,
+        changes: &mut ChangeSums,
+        interval: &Interval<'_>,
+        len: usize,
+        turn: Complex64,
+    );
+
     /// Sum of the baseband, and those of the taps into `sums`.
     fn sums(&self, sums: &mut [Complex64]) -> Complex64;
 }
@@ -217,6 +265,7 @@ pub(super) trait Kernel {
 pub(super) struct FixedPoint<K> {
     kernel: K,
     carrier: CarrierTable,
+    changes: ChangeSums,
     /// The last chunk, filled up with zeros.
     last: [i8; 2 * CHUNK_SAMPLES],
 }
@@ -225,7 +274,8 @@ impl<K: Kernel> FixedPoint<K> {
     pub(super) fn boxed(kernel: K) -> Box<Self> {
         Box::new(Self {
             kernel,
-            carrier: CarrierTable::new(),
+            carrier: CarrierTable::new(K::VECTOR),
+            changes: ChangeSums::new(),
             last: [0; 2 * CHUNK_SAMPLES],
         })
     }
@@ -241,7 +291,10 @@ impl<K: Kernel> FixedPoint<K> {
             interval.amplitude,
         );
         let mut turn = Complex64::cis(-TAU * interval.carrier_phase_cycles.fract());
-        self.kernel.start(interval);
+        let earliest = self.changes.start(interval);
+        let only = earliest.map(|tap| interval.only(tap));
+        let one_by_one = only.as_ref().unwrap_or(interval);
+        self.kernel.start(one_by_one);
         for chunk in interval
             .samples
             .chunks(chunk_samples * interval.components())
@@ -256,10 +309,19 @@ impl<K: Kernel> FixedPoint<K> {
                 self.last[chunk.len()..whole].fill(0);
                 &self.last[..whole]
             };
-            self.kernel.add(interval, chunk, &self.carrier, turn);
+            self.kernel.add(one_by_one, chunk, &self.carrier, turn);
+            if earliest.is_some() {
+                let len = whole / interval.components();
+                self.kernel
+                    .add_changes(&mut self.changes, interval, len, turn);
+            }
             turn *= chunk_turn;
         }
-        let baseband_sum = self.kernel.sums(sums);
+        let baseband_sum = self.kernel.sums(&mut sums[..one_by_one.taps]);
+        if earliest.is_some() {
+            sums.fill(sums[0]);
+            self.changes.finish(sums);
+        }
         let scale =
             32_768.0 / (f64::from(interval.amplitude.carrier) * f64::from(1 << interval.shift));
         for sum in sums {

@@ -47,16 +47,16 @@ type Cell = i64;
 const CROWDED: Cell = i64::MIN;
 
 impl LaneTable {
-    /// The table for `step_chips` a sample (below 1), with byte k for the sample `order[k]` and its
-    /// chip counted from the nominal chip of sample `origin[k]`.
-    fn new(step_chips: f64, order: &[u8; BLOCK_SAMPLES], origin: &[u8; BLOCK_SAMPLES]) -> Self {
-        let fixed = |n: u8| (step_chips * f64::from(n) * 4_294_967_296.0).round() as u64;
+    /// The table for `step_chips` a sample (below 1), byte k for sample k, its chip counted
+    /// from the nominal chip of sample `origin[k]`.
+    fn new(step_chips: f64, origin: &[u8; BLOCK_SAMPLES]) -> Self {
+        let fixed = |n: usize| (step_chips * n as f64 * 4_294_967_296.0).round() as u64;
         let mut by_fraction: Vec<(u32, usize)> = (0..BLOCK_SAMPLES)
-            .map(|lane| (fixed(order[lane]) as u32, lane))
+            .map(|lane| (fixed(lane) as u32, lane))
             .collect();
         by_fraction.sort_unstable_by(|a, b| b.cmp(a));
         let mut row = Row(std::array::from_fn(|lane| {
-            ((fixed(order[lane]) >> 32) - (fixed(origin[lane]) >> 32)) as u8
+            ((fixed(lane) >> 32) - (fixed(origin[lane].into()) >> 32)) as u8
         }));
         let mut rows = Box::new([row; RANKS]);
         let mut falling = [0; RANKS];
@@ -69,7 +69,7 @@ impl LaneTable {
             rows,
             cells: std::array::from_fn(|number| cell(number as u32, &falling)),
             falling,
-            origins: origin.map(|n| (fixed(n) >> 32) as u8),
+            origins: origin.map(|n| (fixed(n.into()) >> 32) as u8),
         }
     }
 
@@ -119,17 +119,14 @@ fn cell(number: u32, falling: &[u32]) -> Cell {
 /// The tables last used, the current one first.
 #[derive(Debug)]
 pub(super) struct LaneTables {
-    order: [u8; BLOCK_SAMPLES],
     origin: [u8; BLOCK_SAMPLES],
     recent: Vec<(u64, LaneTable)>,
 }
 
 impl LaneTables {
-    /// Tables for rows whose byte k belongs to sample `order[k]` and counts chips from sample
-    /// `origin[k]`.
-    pub(super) fn new(order: [u8; BLOCK_SAMPLES], origin: [u8; BLOCK_SAMPLES]) -> Self {
+    /// Tables for rows whose byte k counts chips from sample `origin[k]`.
+    pub(super) fn new(origin: [u8; BLOCK_SAMPLES]) -> Self {
         Self {
-            order,
             origin,
             recent: Vec::with_capacity(TABLES_KEPT),
         }
@@ -143,7 +140,7 @@ impl LaneTables {
             Some(at) => self.recent[..=at].rotate_right(1),
             None => {
                 let step_chips = key as f64 * STEP_QUANTUM_CHIPS;
-                let table = LaneTable::new(step_chips, &self.order, &self.origin);
+                let table = LaneTable::new(step_chips, &self.origin);
                 self.recent.truncate(TABLES_KEPT - 1);
                 self.recent.insert(0, (key, table));
             }
@@ -162,8 +159,7 @@ mod tests {
 
     #[test]
     fn rows_count_the_chips_of_every_sample() {
-        let order = std::array::from_fn(|k| (k * 37 % BLOCK_SAMPLES) as u8);
-        let mut tables = LaneTables::new(order, [0; BLOCK_SAMPLES]);
+        let mut tables = LaneTables::new([0; BLOCK_SAMPLES]);
         for step in [
             1.0 / 16.0,
             0.25,
@@ -177,8 +173,8 @@ mod tests {
             for i in 0..50_000_u32 {
                 let fraction = i.wrapping_mul(2_654_435_761);
                 let row = tables.current().unwrap().row(fraction);
-                for (chip, n) in row.iter().zip(order) {
-                    let expected = (u64::from(fraction) + u64::from(n) * step) >> 32;
+                for (chip, n) in row.iter().zip(0_u64..) {
+                    let expected = (u64::from(fraction) + n * step) >> 32;
                     assert_eq!(u64::from(*chip), expected);
                 }
             }
@@ -187,7 +183,7 @@ mod tests {
 
     #[test]
     fn the_oldest_table_is_given_up() {
-        let mut tables = LaneTables::new(std::array::from_fn(|k| k as u8), [0; BLOCK_SAMPLES]);
+        let mut tables = LaneTables::new([0; BLOCK_SAMPLES]);
         for i in 0..100 {
             tables.select(0.1 + f64::from(i) * 1e-3);
         }

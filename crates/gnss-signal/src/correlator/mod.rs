@@ -8,6 +8,7 @@ mod avx2;
 #[cfg(target_arch = "x86_64")]
 mod avx512;
 mod carrier_table;
+mod change_sums;
 mod code_bits;
 mod fixed_point;
 mod if_bank;
@@ -49,7 +50,7 @@ enum Kernel {
 
 impl Correlator {
     /// A correlator for samples of `front_end` on `instruction_set`. Samples too few per
-    /// chip for it (below 1.8 MHz for AVX2, 1.15 MHz for all) are left to a slower one.
+    /// chip for any but the reference (below 1.15 MHz) are left to that.
     ///
     /// # Errors
     /// [`SignalError::Parameter`] where the sample rate is not a number of at least 1 kHz, or this
@@ -65,7 +66,9 @@ impl Correlator {
         let sample_rate_hz = front_end.sample_rate_hz;
         let kernel = match instruction_set {
             InstructionSet::Reference => Kernel::Reference,
-            InstructionSet::Portable => portable_kernel(),
+            InstructionSet::Portable => {
+                Kernel::Portable(FixedPoint::boxed(portable::Portable::default()))
+            }
             #[cfg(target_arch = "x86_64")]
             InstructionSet::Avx2 => {
                 Kernel::Avx2(FixedPoint::boxed(avx2::Avx2::new(sample_rate_hz)?))
@@ -75,11 +78,10 @@ impl Correlator {
             #[cfg(not(target_arch = "x86_64"))]
             other => return Err(other.unsupported()),
         };
-        let kernel = match kernel {
-            _ if sample_rate_hz < fixed_point::LOWEST_SAMPLE_RATE_HZ => Kernel::Reference,
-            #[cfg(target_arch = "x86_64")]
-            Kernel::Avx2(_) if sample_rate_hz < avx2::LOWEST_SAMPLE_RATE_HZ => portable_kernel(),
-            kernel => kernel,
+        let kernel = if sample_rate_hz < fixed_point::LOWEST_SAMPLE_RATE_HZ {
+            Kernel::Reference
+        } else {
+            kernel
         };
         Ok(Self { front_end, kernel })
     }
@@ -112,8 +114,4 @@ impl Correlator {
         let count = samples.len() / interval.components();
         Ok(Taps::new(sums, count as u32, sample_power))
     }
-}
-
-fn portable_kernel() -> Kernel {
-    Kernel::Portable(FixedPoint::boxed(portable::Portable::default()))
 }

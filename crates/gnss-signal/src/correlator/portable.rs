@@ -4,6 +4,7 @@ use num_complex::Complex64;
 
 use super::{
     carrier_table::CarrierTable,
+    change_sums::ChangeSums,
     code_bits::CodeBits,
     fixed_point::{BLOCK_SAMPLES, Baseband, CODE_PERIOD, Interval, Kernel},
     lane_table::{LaneTable, LaneTables},
@@ -23,7 +24,7 @@ pub(super) struct Portable {
 impl Default for Portable {
     fn default() -> Self {
         Self {
-            lanes: LaneTables::new(std::array::from_fn(|n| n as u8), [0; BLOCK_SAMPLES]),
+            lanes: LaneTables::new([0; BLOCK_SAMPLES]),
             baseband: Baseband::zeroed(),
             phases: [0; MAX_TAPS],
             sums: [Complex64::default(); MAX_TAPS],
@@ -33,6 +34,8 @@ impl Default for Portable {
 }
 
 impl Kernel for Portable {
+    const VECTOR: usize = 16;
+
     fn start(&mut self, interval: &Interval<'_>) {
         self.lanes.select(interval.code_step_chips);
         self.phases = interval.phases;
@@ -53,7 +56,7 @@ impl Kernel for Portable {
         } else {
             wipe_off_real(samples, interval.shift, carrier, &mut self.baseband);
         }
-        let (i, q) = (&self.baseband.i[..len], &self.baseband.q[..len]);
+        let [i, q] = self.baseband.parts().map(|part| &part[..len]);
         let total = |values: &[i8]| values.iter().map(|&v| i32::from(v)).sum::<i32>();
         self.baseband_sum += turn * Complex64::new(total(i).into(), total(q).into());
         let Some(lanes) = self.lanes.current() else {
@@ -78,6 +81,18 @@ impl Kernel for Portable {
         }
     }
 
+    fn add_changes(
+        &mut self,
+        changes: &mut ChangeSums,
+        interval: &Interval<'_>,
+        len: usize,
+        turn: Complex64,
+    ) {
+        changes.add(interval, &mut self.baseband, len, turn, |grid, batch| {
+            grid.locate(batch)
+        });
+    }
+
     fn sums(&self, sums: &mut [Complex64]) -> Complex64 {
         sums.copy_from_slice(&self.sums[..sums.len()]);
         self.baseband_sum
@@ -95,7 +110,8 @@ fn saturate(value: i32) -> i8 {
 
 fn wipe_off_real(samples: &[i8], shift: i32, carrier: &CarrierTable, out: &mut Baseband) {
     let table = carrier.re.iter().zip(&carrier.im);
-    let out = out.i.iter_mut().zip(&mut out.q);
+    let [out_i, out_q] = out.parts_mut();
+    let out = out_i.iter_mut().zip(out_q);
     for ((&x, (&re, &im)), (i, q)) in samples.iter().zip(table).zip(out) {
         let x = i16::from(x) << shift;
         *i = saturate(product(x, re));
@@ -106,7 +122,8 @@ fn wipe_off_real(samples: &[i8], shift: i32, carrier: &CarrierTable, out: &mut B
 fn wipe_off_complex(samples: &[i8], shift: i32, carrier: &CarrierTable, out: &mut Baseband) {
     let (samples, _) = samples.as_chunks::<2>();
     let table = carrier.re.iter().zip(&carrier.im);
-    let out = out.i.iter_mut().zip(&mut out.q);
+    let [out_i, out_q] = out.parts_mut();
+    let out = out_i.iter_mut().zip(out_q);
     for ((x, (&re, &im)), (i, q)) in samples.iter().zip(table).zip(out) {
         let [x_i, x_q] = x.map(|x| i16::from(x) << shift);
         *i = saturate(product(x_i, re) - product(x_q, im));
