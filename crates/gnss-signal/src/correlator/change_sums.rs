@@ -135,7 +135,7 @@ impl ChangeSums {
     /// too far apart.
     pub(super) fn start(&mut self, interval: &Interval<'_>) -> Option<usize> {
         /// Where the other taps have fewer samples of a chip, all together, a window takes longer than those.
-        const FEWEST: f64 = 110.0;
+        const FEWEST: f64 = 120.0;
         let chip_samples = interval.code_step_chips.recip();
         if (interval.taps - 1) as f64 * chip_samples < FEWEST {
             return None;
