@@ -7,10 +7,12 @@ use num_complex::Complex64;
 
 use super::{
     InstructionSet,
+    baseband::Baseband,
     carrier_table::{CarrierTable, TableAmplitude},
-    change_sums::{ChangeSums, FRACTION_SHIFT, Grid, Located},
+    change_sums::{AddedChunk, ChangeSums, FRACTION_SHIFT, Grid, Located},
     code_bits::{BATCH, CodeBits},
-    fixed_point::{BLOCK_SAMPLES, Baseband, Interval, Kernel, MOST_CHIPS, within_period},
+    fixed_point::Kernel,
+    interval::{BLOCK_SAMPLES, Interval, MOST_CHIPS, within_period},
     lane_table::{LaneTable, LaneTables},
 };
 use crate::{MAX_TAPS, SignalError};
@@ -110,15 +112,9 @@ impl Kernel for Avx2 {
         unsafe { add(self, interval, samples, carrier, turn) }
     }
 
-    fn add_changes(
-        &mut self,
-        changes: &mut ChangeSums,
-        interval: &Interval<'_>,
-        len: usize,
-        turn: Complex64,
-    ) {
+    fn add_changes(&mut self, changes: &mut ChangeSums, chunk: &AddedChunk<'_>) {
         // SAFETY: an `Avx2` exists only where its instruction set does (`new`).
-        unsafe { add_changes(&mut self.baseband, changes, interval, len, turn) };
+        unsafe { add_changes(&mut self.baseband, changes, chunk) };
     }
 
     fn sums(&self, sums: &mut [Complex64]) -> Complex64 {
@@ -220,13 +216,9 @@ fn add_all_taps<const WINDOWS: usize>(chunk: &Chunk<'_>, phases: &mut [u64], sum
 pub(super) fn add_changes(
     baseband: &mut Baseband,
     changes: &mut ChangeSums,
-    interval: &Interval<'_>,
-    len: usize,
-    turn: Complex64,
+    chunk: &AddedChunk<'_>,
 ) {
-    changes.add(interval, baseband, len, turn, |grid, batch| {
-        locate(grid, batch)
-    });
+    changes.add(chunk, baseband, |grid, batch| locate(grid, batch));
 }
 
 /// As [`Grid::locate`].

@@ -7,10 +7,12 @@ use num_complex::Complex64;
 
 use super::{
     InstructionSet, avx2,
+    baseband::Baseband,
     carrier_table::{CarrierTable, TableAmplitude},
-    change_sums::ChangeSums,
+    change_sums::{AddedChunk, ChangeSums},
     code_bits::CodeBits,
-    fixed_point::{BLOCK_SAMPLES, Baseband, Interval, Kernel, MOST_CHIPS, within_period},
+    fixed_point::Kernel,
+    interval::{BLOCK_SAMPLES, Interval, MOST_CHIPS, within_period},
     lane_table::{LaneTable, LaneTables},
 };
 use crate::{MAX_TAPS, SignalError};
@@ -93,15 +95,9 @@ impl Kernel for Avx512 {
         unsafe { add(self, interval, samples, carrier, turn) }
     }
 
-    fn add_changes(
-        &mut self,
-        changes: &mut ChangeSums,
-        interval: &Interval<'_>,
-        len: usize,
-        turn: Complex64,
-    ) {
+    fn add_changes(&mut self, changes: &mut ChangeSums, chunk: &AddedChunk<'_>) {
         // SAFETY: an `Avx512` exists only where its instruction set does (`new`).
-        unsafe { avx2::add_changes(&mut self.baseband, changes, interval, len, turn) };
+        unsafe { avx2::add_changes(&mut self.baseband, changes, chunk) };
     }
 
     fn sums(&self, sums: &mut [Complex64]) -> Complex64 {

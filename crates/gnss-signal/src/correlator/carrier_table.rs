@@ -7,7 +7,7 @@ use num_complex::{Complex32, Complex64};
 /// Most samples in a chunk.
 pub(super) const CHUNK_SAMPLES: usize = 1024;
 
-/// Samples within which entries may be in another order.
+/// Samples within which entries have an order of their own.
 const ORDERED: usize = 64;
 
 /// 1.5 * 2^23: added to a small float it leaves the rounded integer in the low bits.
@@ -44,8 +44,8 @@ pub(super) struct TableAmplitude {
 }
 
 impl CarrierTable {
-    /// A table for bytes that are unpacked from vectors of `vector` of them: in each of its quarters of 16 bytes the first
-    /// eight come first, and where these end those that come second. One of 16 has the order of the samples.
+    /// A table for samples that are unpacked from vectors of `vector` bytes: of all lanes of 16 bytes first the lower eight,
+    /// then the upper eight. From one of 16 they come in their own order.
     pub(super) fn new(vector: usize) -> Self {
         let order = std::array::from_fn(|entry| {
             let (start, entry) = (entry / vector * vector, entry % vector);

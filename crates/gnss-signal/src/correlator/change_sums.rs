@@ -8,8 +8,9 @@
 
 use num_complex::Complex64;
 
+use super::baseband::{Baseband, PAD};
 use super::code_bits::BATCH;
-use super::fixed_point::{Baseband, CODE_PERIOD, Interval, ONE_CHIP, PAD, within_period};
+use super::interval::{CODE_PERIOD, Interval, ONE_CHIP, within_period};
 use crate::MAX_TAPS;
 
 /// Samples of a window, at most.
@@ -24,6 +25,16 @@ pub(super) const FRACTION_SHIFT: u32 = 4;
 
 /// A limit that no fraction of a sample passes.
 const NEVER: i16 = i16::MAX;
+
+/// A chunk of an interval whose baseband is there.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct AddedChunk<'a> {
+    pub(super) interval: &'a Interval<'a>,
+    /// Samples.
+    pub(super) len: usize,
+    /// Carrier phase at its start, by which its sums are turned.
+    pub(super) turn: Complex64,
+}
 
 /// Windows of one place, added up over a chunk: those of changes to 1, or to 0.
 #[derive(Debug, Clone, Copy)]
@@ -178,33 +189,34 @@ impl ChangeSums {
         Some(earliest)
     }
 
-    /// Adds the windows of a chunk of `len` samples, turned by the carrier phase at its start.
+    /// Adds the windows of a chunk.
     #[inline(always)]
     pub(super) fn add(
         &mut self,
-        interval: &Interval<'_>,
+        chunk: &AddedChunk<'_>,
         baseband: &mut Baseband,
-        len: usize,
-        turn: Complex64,
         locate: impl Fn(&Grid<'_>, &[u16; BATCH]) -> Located,
     ) {
         if self.lanes == MOST_LANES {
-            self.add_windows::<MOST_LANES>(interval, baseband, len, turn, locate);
+            self.add_windows::<MOST_LANES>(chunk, baseband, locate);
         } else {
-            self.add_windows::<{ MOST_LANES / 2 }>(interval, baseband, len, turn, locate);
+            self.add_windows::<{ MOST_LANES / 2 }>(chunk, baseband, locate);
         }
-        self.phase = within_period(self.phase + interval.code_step(len));
+        self.phase = within_period(self.phase + chunk.interval.code_step(chunk.len));
     }
 
     #[inline(always)]
     fn add_windows<const LANES: usize>(
         &mut self,
-        interval: &Interval<'_>,
+        chunk: &AddedChunk<'_>,
         baseband: &mut Baseband,
-        len: usize,
-        turn: Complex64,
         locate: impl Fn(&Grid<'_>, &[u16; BATCH]) -> Located,
     ) {
+        let AddedChunk {
+            interval,
+            len,
+            turn,
+        } = *chunk;
         let [i, q] = baseband.padded(len);
         // A period on where the last tap is still in the one before.
         let phase = if self.phase < self.span {

@@ -2,7 +2,7 @@
 
 use std::hint::cold_path;
 
-use super::fixed_point::BLOCK_SAMPLES;
+use super::interval::BLOCK_SAMPLES;
 
 /// Step of the code steps for which a table is kept, chips a sample. Half of it over a block is
 /// 4e-6 chips, 1.1 mm.

@@ -7,12 +7,14 @@
 mod avx2;
 #[cfg(target_arch = "x86_64")]
 mod avx512;
+mod baseband;
 mod carrier_table;
 mod change_sums;
 mod code_bits;
 mod fixed_point;
 mod if_bank;
 mod instruction_set;
+mod interval;
 mod lane_table;
 mod portable;
 mod reference;
@@ -24,7 +26,7 @@ pub use instruction_set::InstructionSet;
 
 use num_complex::Complex64;
 
-use self::fixed_point::{FixedPoint, Interval};
+use self::{fixed_point::FixedPoint, interval::Interval};
 use crate::{FrontEnd, Replica, SignalError, Taps};
 
 /// Correlates 8-bit samples with replicas on a chosen instruction set.

@@ -3,10 +3,12 @@
 use num_complex::Complex64;
 
 use super::{
+    baseband::Baseband,
     carrier_table::CarrierTable,
-    change_sums::ChangeSums,
+    change_sums::{AddedChunk, ChangeSums},
     code_bits::CodeBits,
-    fixed_point::{BLOCK_SAMPLES, Baseband, CODE_PERIOD, Interval, Kernel},
+    fixed_point::Kernel,
+    interval::{BLOCK_SAMPLES, CODE_PERIOD, Interval},
     lane_table::{LaneTable, LaneTables},
 };
 use crate::MAX_TAPS;
@@ -81,16 +83,8 @@ impl Kernel for Portable {
         }
     }
 
-    fn add_changes(
-        &mut self,
-        changes: &mut ChangeSums,
-        interval: &Interval<'_>,
-        len: usize,
-        turn: Complex64,
-    ) {
-        changes.add(interval, &mut self.baseband, len, turn, |grid, batch| {
-            grid.locate(batch)
-        });
+    fn add_changes(&mut self, changes: &mut ChangeSums, chunk: &AddedChunk<'_>) {
+        changes.add(chunk, &mut self.baseband, |grid, batch| grid.locate(batch));
     }
 
     fn sums(&self, sums: &mut [Complex64]) -> Complex64 {
