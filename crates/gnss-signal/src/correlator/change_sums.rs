@@ -237,7 +237,6 @@ impl ChangeSums {
             rest: self.chip_samples as u16,
             limits: &self.limits[..interval.taps],
         };
-        let (re, im) = (turn.re as f32, turn.im as f32);
         let mut seen = 0_u32;
         for (batch, done) in batches.iter().zip((0..count).step_by(BATCH)) {
             let Located { at, slot } = locate(&grid, batch);
@@ -253,7 +252,14 @@ impl ChangeSums {
                 seen |= 1 << slot;
             }
         }
+        self.turn_windows::<LANES>(seen, turn);
+    }
+
+    /// Empties the windows that are `seen`, turned by `turn`.
+    #[inline(always)]
+    fn turn_windows<const LANES: usize>(&mut self, mut seen: u32, turn: Complex64) {
         self.seen |= seen;
+        let (re, im) = (turn.re as f32, turn.im as f32);
         let (windows, _) = self.windows.as_chunks_mut::<2>();
         while seen != 0 {
             let place = seen.trailing_zeros() as usize / 2 % PLACES;
