@@ -91,7 +91,10 @@ impl Grid<'_> {
     pub(super) fn locate(&self, batch: &[u16; BATCH]) -> Located {
         let positions = batch.map(|change| {
             let chip = u32::from(change / 2 - self.first_chip);
-            self.origin + chip * self.chip_samples + ((chip * u32::from(self.rest)) >> 16)
+            let rest = (chip * u32::from(self.rest)) >> 16;
+            // Changes beyond the chunk may lie beyond 2^16 samples, and are not looked at.
+            let whole = chip.wrapping_mul(self.chip_samples);
+            self.origin.wrapping_add(whole).wrapping_add(rest)
         });
         let slot = |position: u32, change: u16| {
             let fraction = ((position as u16).wrapping_neg() >> FRACTION_SHIFT) as i16;
@@ -99,7 +102,7 @@ impl Grid<'_> {
             2 * passed.count() as u16 + change % 2
         };
         Located {
-            at: positions.map(|position| ((position + 0xffff) >> 16) as u16),
+            at: positions.map(|position| (position.wrapping_add(0xffff) >> 16) as u16),
             slot: std::array::from_fn(|k| slot(positions[k], batch[k])),
         }
     }

@@ -151,6 +151,21 @@ fn close_taps_are_what_they_are_one_by_one() {
     }
 }
 
+/// So many samples of a chip that changes beyond a chunk lie beyond what 32 bits count.
+#[test]
+fn close_taps_are_summed_at_the_highest_rates() {
+    let mut rng = ChaCha8Rng::seed_from_u64(6);
+    for set in fast_sets() {
+        for rate_hz in [250e6, 1e9] {
+            let front_end = front_end(rate_hz, false);
+            let replica = random_replica(&mut rng, rate_hz, 40_000, &[-0.01, 0.0, 0.01]);
+            let samples = noise(&mut rng, 40_000, 8);
+            let deviation = deviation(set, front_end, &samples, &replica);
+            assert!(deviation < 0.1, "{set} {rate_hz}: {deviation}");
+        }
+    }
+}
+
 #[test]
 fn noise_sums_agree_at_every_rate_and_resolution() {
     let wide: Vec<f64> = (-8..8).map(|k| f64::from(k) * 0.37).collect();
