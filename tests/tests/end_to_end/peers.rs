@@ -116,7 +116,8 @@ fn configuration(samples: &Path, rate_hz: f64, channels: usize, extended_ms: u32
         ("Resampler.implementation", "Pass_Through".into()),
         ("Resampler.item_type", "gr_complex".into()),
         ("Channels_1C.count", channels.to_string()),
-        ("Channels.in_acquisition", "1".into()),
+        // One at a time each waits for a thread of its own to be told, and a busy machine makes that late in the signal.
+        ("Channels.in_acquisition", channels.to_string()),
         ("Channel.signal", "1C".into()),
         (
             "Acquisition_1C.implementation",
