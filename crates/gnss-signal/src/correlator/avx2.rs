@@ -10,7 +10,7 @@ use super::{
     baseband::Baseband,
     carrier_table::{CarrierTable, TableAmplitude},
     change_sums::{AddedChunk, ChangeSums, FRACTION_SHIFT, Grid, Located},
-    code_bits::{BATCH, CodeBits},
+    code_bits::CodeBits,
     fixed_point::Kernel,
     interval::{BLOCK_SAMPLES, Interval, MOST_CHIPS, within_period},
     lane_table::{LaneTable, LaneTables},
@@ -213,17 +213,16 @@ fn add_all_taps<const WINDOWS: usize>(chunk: &Chunk<'_>, phases: &mut [u64], sum
 }
 
 #[target_feature(enable = "avx2,fma")]
-pub(super) fn add_changes(
-    baseband: &mut Baseband,
-    changes: &mut ChangeSums,
-    chunk: &AddedChunk<'_>,
-) {
+fn add_changes(baseband: &mut Baseband, changes: &mut ChangeSums, chunk: &AddedChunk<'_>) {
     changes.add(chunk, baseband, |grid, batch| locate(grid, batch));
 }
 
+/// Changes located at a time.
+const BATCH: usize = 16;
+
 /// As [`Grid::locate`].
 #[target_feature(enable = "avx2,fma")]
-fn locate(grid: &Grid<'_>, batch: &[u16; BATCH]) -> Located {
+fn locate(grid: &Grid<'_>, batch: &[u16; BATCH]) -> Located<BATCH> {
     let zero = _mm256_setzero_si256();
     let chip_samples = _mm256_set1_epi32(grid.chip_samples.cast_signed());
     let origin = _mm256_set1_epi32(grid.origin.cast_signed());
@@ -455,39 +454,18 @@ fn add_total(totals: &mut [__m256i; 2], i: __m256i, q: __m256i) {
 }
 
 #[cfg(test)]
-#[allow(clippy::print_stdout, reason = "a skip must not be silent")]
 mod tests {
-    use rand::{RngExt, SeedableRng};
-    use rand_chacha::ChaCha8Rng;
-
     use super::*;
+    use crate::correlator::change_sums::tests::is_located_as_in_plain_rust;
 
     #[test]
+    #[allow(clippy::print_stdout, reason = "a skip must not be silent")]
     fn windows_are_located_as_in_plain_rust() {
         if !is_supported() {
             println!("SKIPPED: no AVX2");
             return;
         }
-        let mut rng = ChaCha8Rng::seed_from_u64(3);
-        for _ in 0..2000 {
-            let limits: [i16; 11] = std::array::from_fn(|_| rng.random_range(0..4096));
-            let first_chip = rng.random_range(0..1030);
-            let grid = Grid {
-                first_chip,
-                origin: rng.random_range(32 << 16..130 << 16),
-                chip_samples: rng.random_range(7 << 16..32 << 16),
-                rest: rng.random(),
-                limits: &limits,
-            };
-            let change = || rng.random_range(2 * first_chip..2 * first_chip + 300);
-            let batch: [u16; BATCH] = std::iter::repeat_with(change)
-                .take(BATCH)
-                .collect::<Vec<_>>()
-                .try_into()
-                .unwrap();
-            // SAFETY: the instruction set is there.
-            let located = unsafe { locate(&grid, &batch) };
-            assert_eq!(located, grid.locate(&batch), "{grid:?} {batch:?}");
-        }
+        // SAFETY: the instruction set is there.
+        is_located_as_in_plain_rust(|grid, batch| unsafe { locate(grid, batch) });
     }
 }

@@ -9,7 +9,7 @@ use super::{
     InstructionSet, avx2,
     baseband::Baseband,
     carrier_table::{CarrierTable, TableAmplitude},
-    change_sums::{AddedChunk, ChangeSums},
+    change_sums::{AddedChunk, ChangeSums, FRACTION_SHIFT, Grid, Located},
     code_bits::CodeBits,
     fixed_point::Kernel,
     interval::{BLOCK_SAMPLES, Interval, MOST_CHIPS, within_period},
@@ -97,7 +97,7 @@ impl Kernel for Avx512 {
 
     fn add_changes(&mut self, changes: &mut ChangeSums, chunk: &AddedChunk<'_>) {
         // SAFETY: an `Avx512` exists only where its instruction set does (`new`).
-        unsafe { avx2::add_changes(&mut self.baseband, changes, chunk) };
+        unsafe { add_changes(&mut self.baseband, changes, chunk) };
     }
 
     fn sums(&self, sums: &mut [Complex64]) -> Complex64 {
@@ -182,6 +182,56 @@ fn add(
                     std::array::from_mut(sum),
                 );
             }
+        }
+    }
+}
+
+#[target_feature(enable = "avx512f,avx512bw,fma")]
+fn add_changes(baseband: &mut Baseband, changes: &mut ChangeSums, chunk: &AddedChunk<'_>) {
+    changes.add(chunk, baseband, |grid, batch| locate(grid, batch));
+}
+
+/// Changes located at a time.
+const BATCH: usize = 32;
+
+/// As [`Grid::locate`].
+#[target_feature(enable = "avx512f,avx512bw")]
+fn locate(grid: &Grid<'_>, batch: &[u16; BATCH]) -> Located<BATCH> {
+    let zero = _mm512_setzero_si512();
+    let chip_samples = _mm512_set1_epi32(grid.chip_samples.cast_signed());
+    let origin = _mm512_set1_epi32(grid.origin.cast_signed());
+    let chips = _mm512_srli_epi16::<1>(load(batch));
+    let chips = _mm512_sub_epi16(chips, _mm512_set1_epi16(grid.first_chip.cast_signed()));
+    let rest = _mm512_mulhi_epu16(chips, _mm512_set1_epi16(grid.rest.cast_signed()));
+    let position = |chips, rest| {
+        let position = _mm512_add_epi32(_mm512_mullo_epi32(chips, chip_samples), rest);
+        _mm512_add_epi32(position, origin)
+    };
+    let low = position(
+        _mm512_unpacklo_epi16(chips, zero),
+        _mm512_unpacklo_epi16(rest, zero),
+    );
+    let high = position(
+        _mm512_unpackhi_epi16(chips, zero),
+        _mm512_unpackhi_epi16(rest, zero),
+    );
+    let most = _mm512_set1_epi32(0xffff);
+    let next = |position| _mm512_srli_epi32::<16>(_mm512_add_epi32(position, most));
+    let at = _mm512_packus_epi32(next(low), next(high));
+    let fraction = _mm512_packus_epi32(_mm512_and_si512(low, most), _mm512_and_si512(high, most));
+    let fraction = _mm512_srli_epi16::<FRACTION_SHIFT>(_mm512_sub_epi16(zero, fraction));
+    let one = _mm512_set1_epi16(1);
+    let passed = grid.limits.iter().fold(zero, |passed, limit| {
+        let passes = _mm512_cmpgt_epi16_mask(fraction, _mm512_set1_epi16(*limit));
+        _mm512_mask_add_epi16(passed, passes, passed, one)
+    });
+    let bit = _mm512_and_si512(load(batch), one);
+    let slot = _mm512_add_epi16(_mm512_add_epi16(passed, passed), bit);
+    // SAFETY: vectors of 32 numbers of 16 bits, as arrays of them.
+    unsafe {
+        Located {
+            at: std::mem::transmute::<__m512i, [u16; BATCH]>(at),
+            slot: std::mem::transmute::<__m512i, [u16; BATCH]>(slot),
         }
     }
 }
@@ -371,4 +421,21 @@ fn add_total(totals: &mut [__m512i; 2], i: __m512i, q: __m512i) {
     let ones = _mm512_set1_epi8(1);
     totals[0] = _mm512_dpbusd_epi32(totals[0], ones, i);
     totals[1] = _mm512_dpbusd_epi32(totals[1], ones, q);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::correlator::change_sums::tests::is_located_as_in_plain_rust;
+
+    #[test]
+    #[allow(clippy::print_stdout, reason = "a skip must not be silent")]
+    fn windows_are_located_as_in_plain_rust() {
+        if !is_supported() {
+            println!("SKIPPED: no AVX-512");
+            return;
+        }
+        // SAFETY: the instruction set is there.
+        is_located_as_in_plain_rust(|grid, batch| unsafe { locate(grid, batch) });
+    }
 }

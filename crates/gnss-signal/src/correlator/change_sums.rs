@@ -9,7 +9,6 @@
 use num_complex::Complex64;
 
 use super::baseband::{Baseband, PAD};
-use super::code_bits::BATCH;
 use super::interval::{CODE_PERIOD, Interval, ONE_CHIP, within_period};
 use crate::MAX_TAPS;
 
@@ -52,6 +51,13 @@ struct Turned {
     im: [f32; MOST_LANES],
 }
 
+impl Turned {
+    #[inline(always)]
+    fn at(&self, lane: usize) -> Complex64 {
+        Complex64::new(self.re[lane].into(), self.im[lane].into())
+    }
+}
+
 const EMPTY: Window = Window {
     i: [0; MOST_LANES],
     q: [0; MOST_LANES],
@@ -79,7 +85,7 @@ pub(super) struct Grid<'a> {
 
 /// The windows of a batch of changes.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Located {
+pub(super) struct Located<const BATCH: usize> {
     /// First sample of each.
     pub(super) at: [u16; BATCH],
     /// Twice its place, the number of limits passed, and one more where the code changes to 1.
@@ -88,7 +94,7 @@ pub(super) struct Located {
 
 impl Grid<'_> {
     /// Where the windows of `batch` lie.
-    pub(super) fn locate(&self, batch: &[u16; BATCH]) -> Located {
+    pub(super) fn locate<const BATCH: usize>(&self, batch: &[u16; BATCH]) -> Located<BATCH> {
         let positions = batch.map(|change| {
             let chip = u32::from(change / 2 - self.first_chip);
             let rest = (chip * u32::from(self.rest)) >> 16;
@@ -149,7 +155,7 @@ impl ChangeSums {
     /// too far apart.
     pub(super) fn start(&mut self, interval: &Interval<'_>) -> Option<usize> {
         /// Where the other taps have fewer samples of a chip, all together, a window takes longer than those.
-        const FEWEST: f64 = 120.0;
+        const FEWEST: f64 = 80.0;
         let chip_samples = interval.code_step_chips.recip();
         if (interval.taps - 1) as f64 * chip_samples < FEWEST {
             return None;
@@ -194,26 +200,26 @@ impl ChangeSums {
 
     /// Adds the windows of a chunk.
     #[inline(always)]
-    pub(super) fn add(
+    pub(super) fn add<const BATCH: usize>(
         &mut self,
         chunk: &AddedChunk<'_>,
         baseband: &mut Baseband,
-        locate: impl Fn(&Grid<'_>, &[u16; BATCH]) -> Located,
+        locate: impl Fn(&Grid<'_>, &[u16; BATCH]) -> Located<BATCH>,
     ) {
         if self.lanes == MOST_LANES {
-            self.add_windows::<MOST_LANES>(chunk, baseband, locate);
+            self.add_windows::<MOST_LANES, BATCH>(chunk, baseband, locate);
         } else {
-            self.add_windows::<{ MOST_LANES / 2 }>(chunk, baseband, locate);
+            self.add_windows::<{ MOST_LANES / 2 }, BATCH>(chunk, baseband, locate);
         }
         self.phase = within_period(self.phase + chunk.interval.code_step(chunk.len));
     }
 
     #[inline(always)]
-    fn add_windows<const LANES: usize>(
+    fn add_windows<const LANES: usize, const BATCH: usize>(
         &mut self,
         chunk: &AddedChunk<'_>,
         baseband: &mut Baseband,
-        locate: impl Fn(&Grid<'_>, &[u16; BATCH]) -> Located,
+        locate: impl Fn(&Grid<'_>, &[u16; BATCH]) -> Located<BATCH>,
     ) {
         let AddedChunk {
             interval,
@@ -243,8 +249,9 @@ impl ChangeSums {
         let mut seen = 0_u32;
         for (batch, done) in batches.iter().zip((0..count).step_by(BATCH)) {
             let Located { at, slot } = locate(&grid, batch);
-            for (at, slot) in at.into_iter().zip(slot).take(count - done) {
-                let (at, slot) = (usize::from(at), usize::from(slot) % (2 * PLACES));
+            let within = BATCH.min(count - done);
+            for (at, slot) in at[..within].iter().zip(&slot[..within]) {
+                let (at, slot) = (usize::from(*at), usize::from(*slot) % (2 * PLACES));
                 let i = i.get(at..).and_then(|part| part.first_chunk::<LANES>());
                 let q = q.get(at..).and_then(|part| part.first_chunk::<LANES>());
                 let (Some(i), Some(q)) = (i, q) else {
@@ -267,44 +274,89 @@ impl ChangeSums {
         while seen != 0 {
             let place = seen.trailing_zeros() as usize / 2 % PLACES;
             seen &= !(3 << (2 * place));
-            let [to_0, to_1] = &mut windows[place];
+            // Copied, so that the compiler need not ask whether sums and windows overlap.
+            let [to_0, to_1] = windows[place];
+            windows[place] = [EMPTY; 2];
+            let (i, q) = (difference(&to_1.i, &to_0.i), difference(&to_1.q, &to_0.q));
             let turned = &mut self.turned[place];
             for lane in 0..LANES {
-                let i = (i32::from(to_1.i[lane]) - i32::from(to_0.i[lane])) as f32;
-                let q = (i32::from(to_1.q[lane]) - i32::from(to_0.q[lane])) as f32;
-                turned.re[lane] += i * re - q * im;
-                turned.im[lane] += i * im + q * re;
-            }
-            for part in [&mut to_0.i, &mut to_0.q, &mut to_1.i, &mut to_1.q] {
-                part[..LANES].fill(0);
+                turned.re[lane] += i[lane] * re - q[lane] * im;
+                turned.im[lane] += i[lane] * im + q[lane] * re;
             }
         }
     }
 
     /// Takes from the sum of the earliest tap, which all `sums` hold, the changes that the others have not come to yet.
     pub(super) fn finish(&self, sums: &mut [Complex64]) {
-        let limits = self.limits;
+        // Lanes of all windows, then those before each.
+        let mut re = [0.0; MOST_LANES];
+        let mut im = [0.0; MOST_LANES];
         for place in (0..PLACES).filter(|place| self.seen >> (2 * place) & 3 != 0) {
             let turned = &self.turned[place];
-            let mut before = [Complex64::default(); MOST_LANES + 1];
-            let mut sum = Complex64::default();
-            for (lane, before) in before[1..].iter_mut().enumerate().take(self.lanes) {
-                sum += Complex64::new(turned.re[lane].into(), turned.im[lane].into());
-                *before = sum;
+            for lane in 0..MOST_LANES {
+                re[lane] += f64::from(turned.re[lane]);
+                im[lane] += f64::from(turned.im[lane]);
             }
-            for ((sum, whole), limit) in sums.iter_mut().zip(self.whole).zip(limits) {
-                let lower = limits.iter().filter(|other| **other < limit).count();
-                let lanes = whole - u8::from(place > lower);
-                *sum -= before[usize::from(lanes)];
-            }
+        }
+        let mut before = [Complex64::default(); MOST_LANES];
+        for lane in 1..self.lanes {
+            before[lane] = before[lane - 1] + Complex64::new(re[lane - 1], im[lane - 1]);
+        }
+        for ((sum, whole), limit) in sums.iter_mut().zip(self.whole).zip(self.limits) {
+            let Some(last) = usize::from(whole).checked_sub(1) else {
+                continue;
+            };
+            // The last of its samples it takes where its limit is not passed.
+            let lower = self.limits.iter().filter(|other| **other < limit).count();
+            let taken = self.turned[..=lower].iter().map(|turned| turned.at(last));
+            *sum -= before[last] + taken.sum::<Complex64>();
         }
     }
 }
 
-/// Fits 16 bits: a chunk has less than 150 chips where windows are taken, and no more than half of them change to 1.
+/// Fits 16 bits, too (see [`add`]).
+#[inline(always)]
+fn difference(a: &[i16; MOST_LANES], b: &[i16; MOST_LANES]) -> [f32; MOST_LANES] {
+    std::array::from_fn(|lane| f32::from(a[lane].wrapping_sub(b[lane])))
+}
+
+/// Fits 16 bits: a chunk has less than 200 chips where windows are taken, and no more than half of them change to 1.
 #[inline(always)]
 fn add<const LANES: usize>(sums: &mut [i16; MOST_LANES], samples: &[i8; LANES]) {
     for (sum, sample) in sums.iter_mut().zip(samples) {
         *sum = sum.wrapping_add(i16::from(*sample));
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    use super::*;
+
+    /// Holds a vector form of [`Grid::locate`] against it.
+    pub(in crate::correlator) fn is_located_as_in_plain_rust<const BATCH: usize>(
+        locate: impl Fn(&Grid<'_>, &[u16; BATCH]) -> Located<BATCH>,
+    ) {
+        let mut rng = ChaCha8Rng::seed_from_u64(3);
+        for _ in 0..2000 {
+            let limits: [i16; 11] = std::array::from_fn(|_| rng.random_range(0..4096));
+            let first_chip = rng.random_range(0..1030);
+            let grid = Grid {
+                first_chip,
+                origin: rng.random_range(32 << 16..130 << 16),
+                chip_samples: rng.random_range(5 << 16..32 << 16),
+                rest: rng.random(),
+                limits: &limits,
+            };
+            let batch =
+                std::array::from_fn(|_| rng.random_range(2 * first_chip..2 * first_chip + 400));
+            assert_eq!(
+                locate(&grid, &batch),
+                grid.locate(&batch),
+                "{grid:?} {batch:?}"
+            );
+        }
     }
 }

@@ -28,9 +28,6 @@ pub(super) fn code_bits(signal: SignalId) -> &'static CodeBits {
     &CA_CODE_BITS[usize::from(signal.prn() - signal.spec().first_prn)]
 }
 
-/// Changes of a code that are looked at together.
-pub(super) const BATCH: usize = 16;
-
 /// Chips at which a code changes, over as many as [`CodeBits`] holds.
 #[derive(Debug)]
 pub(super) struct CodeChanges {
@@ -60,7 +57,10 @@ impl CodeChanges {
     /// Changes at `chips`, in batches from the first on: how many there are, and twice the chip of each, and one more where
     /// the code changes to 1. The last batch goes on beyond them.
     #[inline(always)]
-    pub(super) fn within(&self, chips: Range<usize>) -> (&[[u16; BATCH]], usize) {
+    pub(super) fn within<const BATCH: usize>(
+        &self,
+        chips: Range<usize>,
+    ) -> (&[[u16; BATCH]], usize) {
         let before = |chip: usize| self.before.get(chip).map_or(usize::MAX, |n| (*n).into());
         let (first, end) = (before(chips.start), before(chips.end));
         let (batches, _) = self.changes.get(first..).unwrap_or_default().as_chunks();
@@ -86,7 +86,7 @@ mod tests {
             let signal = SignalId::gps_l1_ca(prn).unwrap();
             let (code, changes) = (code_bits(signal), code_changes(signal));
             for (start, end) in [(1, 2), (1, 80), (500, 640), (1023, 1100), (1030, 1180)] {
-                let (batches, count) = changes.within(start..end);
+                let (batches, count) = changes.within::<16>(start..end);
                 let found = batches.as_flattened()[..count].iter().copied();
                 let expected = (start..end).filter(|chip| code[*chip] != code[*chip - 1]);
                 assert!(found.eq(expected.map(|chip| 2 * chip as u16 + u16::from(code[chip]))));

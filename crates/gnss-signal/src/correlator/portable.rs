@@ -84,7 +84,9 @@ impl Kernel for Portable {
     }
 
     fn add_changes(&mut self, changes: &mut ChangeSums, chunk: &AddedChunk<'_>) {
-        changes.add(chunk, &mut self.baseband, |grid, batch| grid.locate(batch));
+        changes.add(chunk, &mut self.baseband, |grid, batch: &[u16; 16]| {
+            grid.locate(batch)
+        });
     }
 
     fn sums(&self, sums: &mut [Complex64]) -> Complex64 {
