@@ -84,6 +84,7 @@ impl VectorTracking {
         let worst = alarms.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(s, _)| s);
         let mut dispositions = Vec::new();
         let mut weighted = Vec::new();
+        let mut above_mask = Vec::new();
         for innovation in innovations.satellites() {
             let satellite = innovation.satellite;
             let mut members = epoch.members.iter();
@@ -99,6 +100,7 @@ impl VectorTracking {
             let change = if waits { None } else { watch.follow() };
             dispositions.push((satellite, watch.disposition(policy, sigma_m)));
             weighted.push(watch.weighted(sigma_m));
+            above_mask.push(innovation.look.elevation_rad >= self.model.elevation_mask_rad);
             if let Some(change) = change {
                 let kind = report::change(&change, policy);
                 epoch.events.push((Some(satellite), kind));
@@ -107,7 +109,7 @@ impl VectorTracking {
                 }
             }
         }
-        let weighted = too_few::weight(&mut dispositions, &weighted);
+        let weighted = too_few::weight(&mut dispositions, &weighted, &above_mask);
         if (weighted > 0) != self.too_few_left {
             self.too_few_left = weighted > 0;
             epoch
