@@ -6,8 +6,8 @@ use gnss_nav::filter::Disposition;
 use super::NEEDED;
 
 /// Where exclusion would leave fewer satellites than a fix needs, gives each of `told` its disposition of
-/// `weighted` (in the same order) instead; returns how many are not left out by that. Only those `above_mask` (again in
-/// that order) help a fix.
+/// `weighted` instead; returns how many are not left out by that. Only those `above_mask` help a fix, and only to them is
+/// it given. All three are in the same order.
 ///
 /// A filter that goes on without measurements drifts until it finds all of them faulty; a wrong one with little
 /// weight holds it.
@@ -16,17 +16,22 @@ pub(super) fn weight(
     weighted: &[Disposition],
     above_mask: &[bool],
 ) -> usize {
-    let is_excluded = |disposition: Disposition| disposition == Disposition::Exclude;
-    let excluded = told.iter().filter(|(_, d)| is_excluded(*d)).count();
-    let left = told.iter().zip(above_mask);
-    let left = left.filter(|((_, d), above)| **above && !is_excluded(*d));
-    if excluded == 0 || left.count() >= NEEDED {
+    let told = told.iter_mut().zip(weighted).zip(above_mask);
+    let mut told: Vec<_> = told
+        .filter_map(|(((_, told), weighted), above)| above.then_some((told, *weighted)))
+        .collect();
+    let excluded = |told: &[(&mut Disposition, Disposition)]| {
+        let excluded = told.iter().filter(|(d, _)| **d == Disposition::Exclude);
+        excluded.count()
+    };
+    let before = excluded(&told);
+    if before == 0 || told.len() - before >= NEEDED {
         return 0;
     }
-    for ((_, disposition), weighted) in told.iter_mut().zip(weighted) {
-        *disposition = *weighted;
+    for (told, weighted) in &mut told {
+        **told = *weighted;
     }
-    excluded - told.iter().filter(|(_, d)| is_excluded(*d)).count()
+    before - excluded(&told)
 }
 
 #[cfg(test)]
@@ -72,11 +77,19 @@ mod tests {
     }
 
     #[test]
-    fn a_satellite_below_the_mask_does_not_hold_a_fix() {
+    fn a_satellite_below_the_mask_holds_no_fix() {
         let mut all = told(8, 4);
         let mut above_mask = [true; 8];
         above_mask[7] = false;
         assert_eq!(weight(&mut all, &[WEIGHTED; 8], &above_mask), 4);
-        assert!(all.iter().all(|(_, d)| *d == WEIGHTED));
+        assert!(all[..7].iter().all(|(_, d)| *d == WEIGHTED));
+        assert_eq!(all[7].1, Disposition::Use);
+        // Nor is it missed where three others are left.
+        let mut all = told(4, 1);
+        assert_eq!(
+            weight(&mut all, &[WEIGHTED; 4], &[false, true, true, true]),
+            0
+        );
+        assert_eq!(all, told(4, 1));
     }
 }
