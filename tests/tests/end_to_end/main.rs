@@ -2,7 +2,6 @@
 
 mod flight;
 mod front_ends;
-mod peers;
 mod raim;
 mod rebuilt_static;
 mod recordings;

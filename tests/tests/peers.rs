@@ -1,4 +1,6 @@
 //! GNSS-SDR, a receiver that nobody here wrote, on made-up signals: it takes them for real ones.
+//!
+//! A binary of its own: its threads race through the file, and beside other tests it begins late in the signal.
 #![allow(
     clippy::unwrap_used,
     clippy::panic,
