@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use num_complex::{Complex32, Complex64};
 
 /// Most samples in a chunk.
-pub(super) const CHUNK_SAMPLES: usize = 1024;
+pub(super) const CHUNK_SAMPLES: usize = 2048;
 
 /// Samples within which entries have an order of their own.
 const ORDERED: usize = 64;
@@ -138,7 +138,7 @@ mod tests {
                 let n = entry / ORDERED * ORDERED + table.order[entry % ORDERED];
                 let exact = Complex64::cis(-TAU * step_cycles * n as f64) * 32_700.0;
                 let error = exact - Complex64::new(table.re[entry].into(), table.im[entry].into());
-                // Half a unit of rounding in each part, and ten doublings of f32 rounding
+                // Half a unit of rounding in each part, and eleven doublings of f32 rounding
                 // (6e-8 * 32700 each).
                 assert!(error.norm() < 0.75, "{step_cycles} at {n}: {error}");
             }

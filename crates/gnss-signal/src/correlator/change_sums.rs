@@ -314,13 +314,13 @@ impl ChangeSums {
     }
 }
 
-/// Fits 16 bits, too (see [`add`]).
+/// Fits 16 bits: a chunk has fewer than 256 chips where windows are taken.
 #[inline(always)]
 fn difference(a: &[i16; MOST_LANES], b: &[i16; MOST_LANES]) -> [f32; MOST_LANES] {
     std::array::from_fn(|lane| f32::from(a[lane].wrapping_sub(b[lane])))
 }
 
-/// Fits 16 bits: a chunk has less than 200 chips where windows are taken, and no more than half of them change to 1.
+/// Fits 16 bits (see [`difference`]).
 #[inline(always)]
 fn add<const LANES: usize>(sums: &mut [i16; MOST_LANES], samples: &[i8; LANES]) {
     for (sum, sample) in sums.iter_mut().zip(samples) {

@@ -19,6 +19,12 @@ pub(super) const CODE_PERIOD: u64 = (CA_CODE_LENGTH_CHIPS as u64) << 32;
 /// that bits of this mask hold them all.
 pub(super) const MOST_CHIPS: usize = 2047;
 
+/// Samples in a chunk that is not long.
+const MEDIUM_SAMPLES: usize = 1024;
+
+/// Chips of a long chunk: with those that its last tap is late fewer than 256, for whose changes sums of 16 bits do.
+const MOST_CHIPS_OF_LONG: f64 = 250.0;
+
 /// A phase below two code periods, within the first.
 #[inline(always)]
 pub(super) fn within_period(phase: u64) -> u64 {
@@ -86,12 +92,17 @@ impl<'a> Interval<'a> {
         if self.complex { 2 } else { 1 }
     }
 
-    /// Samples in a chunk: fewer in short intervals, where the carrier table would cost most.
+    /// Samples in a chunk: fewer in short intervals, where the carrier table would cost most, and in long ones more where a
+    /// chip has many.
     pub(super) fn chunk_samples(&self) -> usize {
         let count = self.samples.len() / self.components();
+        let most = (MOST_CHIPS_OF_LONG / self.code_step_chips) as usize;
+        let most = (most / BLOCK_SAMPLES * BLOCK_SAMPLES).clamp(MEDIUM_SAMPLES, CHUNK_SAMPLES);
         (count / 8)
+            .min(MEDIUM_SAMPLES)
+            .max(count / 64)
             .next_multiple_of(BLOCK_SAMPLES)
-            .clamp(256, CHUNK_SAMPLES)
+            .clamp(256, most)
     }
 
     /// Code step of `samples` samples, 32.32 bits of chips.

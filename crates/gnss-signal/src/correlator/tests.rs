@@ -118,9 +118,10 @@ fn close_taps_are_what_they_are_one_by_one() {
         let (mut squares, mut cases) = (0.0, 0);
         for rate_hz in [8.192e6, 12.5e6, 16.368e6, 16.369e6, 20.48e6, 25e6] {
             for (offsets, complex) in [(&eleven[..], false), (&scattered, true)] {
-                for code_phase_chips in [0.01, 1022.99, rng.random_range(0.0..1023.0)] {
+                let random_chips = rng.random_range(0.0..1023.0);
+                for (code_phase_chips, ms) in [(0.01, 2.2), (1022.99, 2.2), (random_chips, 20.3)] {
                     let front_end = front_end(rate_hz, complex);
-                    let count = (rate_hz * 2.2e-3) as usize + rng.random_range(0..64);
+                    let count = (rate_hz * 1e-3 * ms) as usize + rng.random_range(0..64);
                     let together = Replica {
                         code_phase_chips,
                         ..random_replica(&mut rng, rate_hz, count as u64, offsets)
@@ -382,9 +383,13 @@ fn full_scale_samples_do_not_overflow() {
     let sixteen: Vec<f64> = (0..16).map(|k| f64::from(k) * 0.06).collect();
     for set in fast_sets() {
         for (complex, value) in [(false, -127_i8), (false, 127), (true, -127), (true, 127)] {
-            for (rate_hz, offsets) in [(16.368e6, &[0.0][..]), (5.5e6, &sixteen)] {
+            for (rate_hz, ms, offsets) in [
+                (16.368e6, 1.0, &[0.0][..]),
+                (5.5e6, 1.0, &sixteen),
+                (8.4e6, 20.0, &sixteen),
+            ] {
                 let front_end = front_end(rate_hz, complex);
-                let count = (rate_hz * 1e-3) as usize;
+                let count = (rate_hz * 1e-3 * ms) as usize;
                 let mut replica = random_replica(&mut rng, rate_hz, count as u64, offsets);
                 replica.carrier_frequency_hz = 0.0;
                 let samples = vec![value; count * if complex { 2 } else { 1 }];
