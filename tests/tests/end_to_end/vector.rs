@@ -1,6 +1,8 @@
 //! Vector tracking on scenarios at the correlator level, judged against their truth.
 #![allow(clippy::unwrap_used, reason = "a failure here is a failed test")]
 
+use gnss_nav::Ephemeris;
+use gnss_nav::constants::MU_M3_PER_S2;
 use receiver::pipeline::{Settings, VectorSettings};
 use receiver::record::{ChannelRecord, EventKind, Lock, LoopMembership, Status};
 use xtask::judged::{Judged, JudgedEpoch, receive, rms, settings};
@@ -386,6 +388,49 @@ fn a_clock_that_has_run_off_tells_no_wrong_millisecond() {
         |c: &&ChannelRecord| c.satellite.prn == 17 && c.time_s > 235.0 && c.pseudorange_m.is_some();
     let back_s = judged.channels.iter().find(back).unwrap().time_s;
     assert!(back_s < 240.5, "{back_s} s");
+}
+
+/// The same orbit counted from a time `by_s` earlier.
+fn aged(mut ephemeris: Ephemeris, by_s: f64) -> Ephemeris {
+    let mean_motion = MU_M3_PER_S2.sqrt() / ephemeris.sqrt_a.powi(3) + ephemeris.delta_n_rad_s;
+    ephemeris.toe = ephemeris.toe + -by_s;
+    ephemeris.m0_rad -= mean_motion * by_s;
+    ephemeris.omega0_rad -= ephemeris.omega_dot_rad_s * by_s;
+    ephemeris.i0_rad -= ephemeris.idot_rad_s * by_s;
+    ephemeris
+}
+
+#[test]
+fn a_channel_whose_ephemeris_runs_out_keeps_its_signal_and_learns_the_next() {
+    const RUNS_OUT_S: f64 = 10.0;
+    let overrides = ["duration_s=30", "receiver={assisted=true}"];
+    let scenario = scenario("static-open-sky", &overrides, None);
+    let mut settings = vector(&scenario);
+    let known = settings.aiding.ephemerides.iter_mut();
+    for ephemeris in known.filter(|e| e.satellite.prn == 17) {
+        let ends = ephemeris.toe + ephemeris.fit_interval_h() * 1800.0;
+        let runs_out = scenario.truth.start + RUNS_OUT_S;
+        *ephemeris = aged(ephemeris.clone(), ends - runs_out);
+    }
+    let judged = receive(&scenario, Level::Correlator, &settings).unwrap();
+    let between = |from_s: f64, to_s: f64| {
+        let channels = judged.channels.iter();
+        let of_17 = channels.filter(move |c| c.satellite.prn == 17);
+        of_17.filter(move |c| (from_s..to_s).contains(&c.time_s))
+    };
+    let membership = |c: &ChannelRecord| c.tracking.as_ref().unwrap().membership;
+    let steered = |c: &ChannelRecord| membership(c) == LoopMembership::Vector;
+    assert!(between(RUNS_OUT_S - 2.0, RUNS_OUT_S).all(steered));
+    let alone: Vec<_> = between(RUNS_OUT_S + 0.2, 18.0).collect();
+    assert!(alone.len() > 70, "{} epochs", alone.len());
+    for channel in alone {
+        let lock = channel.tracking.as_ref().unwrap().lock;
+        assert!(!steered(channel) && lock == Lock::Carrier, "{channel:?}");
+    }
+    // Its message is read 18 s after the start, which is that of a frame.
+    assert!(between(19.0, 30.0).count() > 100);
+    assert!(between(19.0, 30.0).all(steered));
+    assert!(judged.epochs.iter().all(|e| e.horizontal_m() < 5.0));
 }
 
 #[test]

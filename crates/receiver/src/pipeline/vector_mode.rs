@@ -17,8 +17,6 @@ const FIXES_TO_SWITCH: u32 = 3;
 /// Range rates of a snapshot that fit one velocity miss it by less, m/s; those of an inverted spectrum by
 /// hundreds.
 const RATE_AGREEMENT_MPS: f64 = 10.0;
-/// Deviation of the code phase when channels get their own loops back, chips.
-const RELEASED_SIGMA_CHIPS: f64 = 0.1;
 
 impl<B: CorrelatorBank> Run<'_, B> {
     /// Switches to vector tracking once fixes agree with themselves and the clock is exact.
@@ -200,8 +198,7 @@ impl<B: CorrelatorBank> Run<'_, B> {
             return Ok(());
         }
         for slot in &mut self.slots {
-            slot.channel
-                .release(RELEASED_SIGMA_CHIPS * RELEASED_SIGMA_CHIPS);
+            slot.channel.release(vector::RELEASED_VARIANCE_CHIPS2);
         }
         let to = LoopMembership::Scalar;
         self.emit(now, None, EventKind::ModeSwitched { to })

@@ -49,7 +49,7 @@ pub(super) use monitors::Monitor;
 pub(super) use report::{change, observations};
 use scatter::Scatter;
 pub use settings::{FilterKind, MeasurementNoise, Policy, VectorSettings};
-pub(super) use steering::steering;
+pub(super) use steering::{RELEASED_VARIANCE_CHIPS2, steering};
 use watch::Watch;
 
 /// Satellites of a fix.

@@ -9,9 +9,13 @@ use super::settings::{MeasurementNoise, VectorSettings};
 use super::{Member, Surroundings, Time, VectorTracking};
 use crate::pipeline::slot::Slot;
 
+/// Variance of the code phase when a channel gets its own loops back, chips^2.
+pub(in crate::pipeline) const RELEASED_VARIANCE_CHIPS2: f64 = 0.01;
+
 impl VectorTracking {
     /// Puts every channel whose bit boundaries are known, and where time is coarse every channel, where its
-    /// signal is expected; of `members` it is known where their satellites are.
+    /// signal is expected; of `members` it is known where their satellites are. A channel of which nothing is expected any
+    /// more, its ephemeris having run out, gets its own loops back, and learns the next.
     pub(in crate::pipeline) fn steer(
         &self,
         around: &Surroundings,
@@ -28,7 +32,12 @@ impl VectorTracking {
                 )),
                 None => self.expected(around, slot.satellite),
             };
-            let Some(expected) = expected else { continue };
+            let Some(expected) = expected else {
+                if slot.channel.is_steered() {
+                    slot.channel.release(RELEASED_VARIANCE_CHIPS2);
+                }
+                continue;
+            };
             let to = steering(around.tick, &expected, self.time());
             match self.time() {
                 Time::Exact => slot.channel.steer(&to),
