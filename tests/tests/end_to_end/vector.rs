@@ -410,7 +410,7 @@ fn a_channel_whose_ephemeris_runs_out_keeps_its_signal_and_learns_the_next() {
     for ephemeris in known.filter(|e| e.satellite.prn == 17) {
         let ends = ephemeris.toe + ephemeris.fit_interval_h() * 1800.0;
         let runs_out = scenario.truth.start + RUNS_OUT_S;
-        *ephemeris = aged(ephemeris.clone(), ends - runs_out);
+        *ephemeris = aged(*ephemeris, ends - runs_out);
     }
     let judged = receive(&scenario, Level::Correlator, &settings).unwrap();
     let between = |from_s: f64, to_s: f64| {
