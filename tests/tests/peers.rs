@@ -2,7 +2,7 @@
 //!
 //! A binary of its own: its threads race through the file, and the busier the machine the later in the signal they begin.
 //! So each channel is told its satellite (those it would search in vain cost it the start of a frame), its Doppler is
-//! found to 50 Hz, which its loops always pull in, and there is signal for one frame more than it needs.
+//! found to 50 Hz, which its loops seldom fail to pull in, and there is signal for one frame more than it needs.
 #![allow(
     clippy::unwrap_used,
     clippy::panic,

@@ -36,6 +36,9 @@ fn eleven_taps() -> Option<TapOffsets> {
 fn bench(criterion: &mut Criterion) {
     let fronts = [
         ("real_16.368_Msps", 16.368e6, 4.092e6, false),
+        // Changes of the code lie anywhere between samples.
+        ("real_16.369_Msps", 16.369e6, 4.092e6, false),
+        ("real_12_Msps", 12e6, 3e6, false),
         ("complex_2.6_Msps", 2.6e6, 0.0, true),
     ];
     for (name, sample_rate_hz, intermediate_frequency_hz, complex) in fronts {

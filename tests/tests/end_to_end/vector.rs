@@ -420,6 +420,7 @@ fn a_channel_whose_ephemeris_runs_out_keeps_its_signal_and_learns_the_next() {
     };
     let membership = |c: &ChannelRecord| c.tracking.as_ref().unwrap().membership;
     let steered = |c: &ChannelRecord| membership(c) == LoopMembership::Vector;
+    assert!(between(RUNS_OUT_S - 2.0, RUNS_OUT_S).count() > 15);
     assert!(between(RUNS_OUT_S - 2.0, RUNS_OUT_S).all(steered));
     let alone: Vec<_> = between(RUNS_OUT_S + 0.2, 18.0).collect();
     assert!(alone.len() > 70, "{} epochs", alone.len());
